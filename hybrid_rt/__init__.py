@@ -1,0 +1,48 @@
+"""Screen-space ray marching in front of an exact tracer: raster, march, trace, judge."""
+
+from hybrid_rt.camera import project, unproject
+from hybrid_rt.errors import (
+    ArgumentError,
+    EmbreeError,
+    HybridRTError,
+    MeshFileError,
+    UnknownNameError,
+)
+from hybrid_rt.io import read_mesh
+from hybrid_rt.scene import load_scene
+from hybrid_rt.types import (
+    Camera,
+    DepthPyramid,
+    GBuffer,
+    Hits,
+    HybridResult,
+    Marched,
+    MarchStatus,
+    Mesh,
+    Rays,
+    Scene,
+)
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "ArgumentError",
+    "Camera",
+    "DepthPyramid",
+    "EmbreeError",
+    "GBuffer",
+    "Hits",
+    "HybridRTError",
+    "HybridResult",
+    "MarchStatus",
+    "Marched",
+    "Mesh",
+    "MeshFileError",
+    "Rays",
+    "Scene",
+    "UnknownNameError",
+    "load_scene",
+    "project",
+    "read_mesh",
+    "unproject",
+]

@@ -1,0 +1,151 @@
+"""The one place that validates arguments; every failure names argument, expected and got."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid_rt.errors import ArgumentError
+
+
+def describe(value: Any) -> str:
+    """Return a short description of a value for an error message."""
+    if isinstance(value, np.ndarray):
+        return f"an array of shape {value.shape} and dtype {value.dtype}"
+    text = repr(value)
+    if len(text) > 80:
+        text = text[:77] + "..."
+    return f"{text} ({type(value).__name__})"
+
+
+def _shape_text(shape: tuple[int | str, ...]) -> str:
+    return "(" + ", ".join(str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
+
+
+def array(
+    argument: str, value: Any, shape: tuple[int | str, ...], dtype: type[np.generic]
+) -> NDArray[Any]:
+    """Return `value` as a C-contiguous array of `dtype`, converted only within its kind.
+
+    Parameters
+    ----------
+    argument : str
+        Name for the error message.
+    value : array_like
+        What the caller passed.
+    shape : tuple of int or str
+        Expected shape; a string stands for any length ("N"), the same string for the same length.
+    dtype : type
+        Wanted dtype. Floating targets take any floating input (float64 is rounded), integer targets
+        take any integer input that fits, bool takes bool.
+
+    Raises
+    ------
+    ArgumentError
+        Wrong kind, wrong shape, or an integer that does not fit.
+    """
+    want = np.dtype(dtype)
+    expected = f"an array of shape {_shape_text(shape)} and dtype {want}"
+    try:
+        arr = np.asarray(value)
+    except (ValueError, TypeError) as error:
+        raise ArgumentError(argument, expected, describe(value)) from error
+    kinds = {"f": "f", "i": "iu", "u": "iu", "b": "b"}[want.kind]
+    if arr.dtype.kind not in kinds:
+        raise ArgumentError(argument, expected, describe(arr))
+    lengths: dict[str, int] = {}
+    fits = arr.ndim == len(shape) and all(
+        n == lengths.setdefault(m, n) if isinstance(m, str) else n == m
+        for n, m in zip(arr.shape, shape, strict=True)
+    )
+    if not fits:
+        raise ArgumentError(argument, expected, describe(arr))
+    if want.kind in "iu" and arr.dtype != want and arr.size:
+        info = np.iinfo(want)
+        low, high = int(arr.min()), int(arr.max())
+        if low < info.min or high > info.max:
+            raise ArgumentError(argument, f"integers that fit {want}", f"values {low} to {high}")
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.ascontiguousarray(arr, dtype=want)
+
+
+def same_length(argument: str, value: NDArray[Any], other: str, length: int) -> None:
+    """Raise unless `value` has `length` rows, the length of the argument named `other`."""
+    if len(value) != length:
+        raise ArgumentError(argument, f"{length} rows, as many as {other}", f"{len(value)} rows")
+
+
+def finite_rows(argument: str, value: NDArray[Any], what: str) -> None:
+    """Raise, naming the first bad row and how many there are, unless all of `value` is finite."""
+    flat = value.reshape(len(value), -1)
+    bad = ~np.isfinite(flat).all(axis=1)
+    if bad.any():
+        first = int(np.argmax(bad))
+        row = ", ".join(f"{x:g}" for x in flat[first])
+        raise ArgumentError(
+            argument,
+            f"finite {what}",
+            f"{int(bad.sum())} not finite, the first at index {first}: ({row})",
+        )
+
+
+def vector3(argument: str, value: Any) -> tuple[float, float, float]:
+    """Return `value` as three finite floats."""
+    expected = "three finite numbers"
+    try:
+        arr = np.asarray(value, dtype=np.float64)
+    except (ValueError, TypeError) as error:
+        raise ArgumentError(argument, expected, describe(value)) from error
+    if arr.shape != (3,) or not np.isfinite(arr).all():
+        raise ArgumentError(argument, expected, describe(value))
+    return float(arr[0]), float(arr[1]), float(arr[2])
+
+
+def real(
+    argument: str,
+    value: Any,
+    *,
+    above: float = -math.inf,
+    below: float = math.inf,
+) -> float:
+    """Return `value` as a finite float strictly between `above` and `below`."""
+    expected = "a finite number"
+    if above > -math.inf:
+        expected += f" > {above:g}"
+    if below < math.inf:
+        expected += f" and < {below:g}" if above > -math.inf else f" < {below:g}"
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise ArgumentError(argument, expected, describe(value))
+    x = float(value)
+    if not (math.isfinite(x) and above < x < below):
+        raise ArgumentError(argument, expected, describe(value))
+    return x
+
+
+def integer(argument: str, value: Any, *, least: int, most: int | None = None) -> int:
+    """Return `value` as an int of at least `least` and at most `most`."""
+    expected = f"an integer >= {least}" + (f" and <= {most}" if most is not None else "")
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral):
+        raise ArgumentError(argument, expected, describe(value))
+    n = int(value)
+    if n < least or (most is not None and n > most):
+        raise ArgumentError(argument, expected, describe(value))
+    return n
+
+
+def choice(argument: str, value: Any, choices: tuple[Any, ...]) -> Any:
+    """Return `value` if it is one of `choices`."""
+    if value not in choices:
+        listed = ", ".join(repr(c) for c in choices)
+        raise ArgumentError(argument, f"one of {listed}", describe(value))
+    return value
+
+
+def instance(argument: str, value: Any, cls: type) -> None:
+    """Raise unless `value` is an instance of `cls`."""
+    if not isinstance(value, cls):
+        raise ArgumentError(argument, f"a {cls.__name__}", describe(value))

@@ -1,0 +1,20 @@
+"""The one place that sets how kernels are compiled.
+
+No fast-math at all: infinities and NaN mean something here (a background pixel, a ray without an
+answer), and the oracles are compared bit for bit, which reassociation and contraction would break.
+The error model is NumPy's, so that 1 / 0 is an infinity and not a branch. Compiled code is cached
+beside the sources.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+kernel = njit(cache=True, nogil=True, error_model="numpy", fastmath=False)
+"""A function called from Python, or from other kernels, on one thread."""
+
+parallel_kernel = njit(cache=True, nogil=True, error_model="numpy", fastmath=False, parallel=True)
+"""A function whose `prange` loops run on all threads; outputs must not depend on how many."""
+
+inlined = njit(cache=True, nogil=True, error_model="numpy", fastmath=False, forceinline=True)
+"""A named piece of a kernel body; LLVM puts it in place."""
