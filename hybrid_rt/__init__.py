@@ -8,7 +8,10 @@ from hybrid_rt.errors import (
     MeshFileError,
     UnknownNameError,
 )
+from hybrid_rt.hybrid import trace_hybrid
 from hybrid_rt.io import read_mesh
+from hybrid_rt.march import march
+from hybrid_rt.rays import mirror_rays
 from hybrid_rt.scene import load_scene
 from hybrid_rt.types import (
     Camera,
@@ -42,7 +45,10 @@ __all__ = [
     "Scene",
     "UnknownNameError",
     "load_scene",
+    "march",
+    "mirror_rays",
     "project",
     "read_mesh",
+    "trace_hybrid",
     "unproject",
 ]
