@@ -9,6 +9,8 @@ from hybrid_rt.errors import (
     UnknownNameError,
 )
 from hybrid_rt.io import read_mesh
+from hybrid_rt.pyramid import build_depth_pyramid
+from hybrid_rt.raster import rasterize
 from hybrid_rt.scene import load_scene
 from hybrid_rt.types import (
     Camera,
@@ -41,8 +43,10 @@ __all__ = [
     "Rays",
     "Scene",
     "UnknownNameError",
+    "build_depth_pyramid",
     "load_scene",
     "project",
+    "rasterize",
     "read_mesh",
     "unproject",
 ]
