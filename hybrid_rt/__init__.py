@@ -11,6 +11,8 @@ from hybrid_rt.errors import (
 from hybrid_rt.hybrid import trace_hybrid
 from hybrid_rt.io import read_mesh
 from hybrid_rt.march import march
+from hybrid_rt.pyramid import build_depth_pyramid
+from hybrid_rt.raster import rasterize
 from hybrid_rt.rays import mirror_rays
 from hybrid_rt.scene import load_scene
 from hybrid_rt.types import (
@@ -44,10 +46,12 @@ __all__ = [
     "Rays",
     "Scene",
     "UnknownNameError",
+    "build_depth_pyramid",
     "load_scene",
     "march",
     "mirror_rays",
     "project",
+    "rasterize",
     "read_mesh",
     "trace_hybrid",
     "unproject",
