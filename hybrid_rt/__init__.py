@@ -10,6 +10,7 @@ from hybrid_rt.errors import (
 )
 from hybrid_rt.io import read_mesh
 from hybrid_rt.scene import load_scene
+from hybrid_rt.trace import BruteForceTracer, EmbreeTracer, embree_info, packet_available
 from hybrid_rt.types import (
     Camera,
     DepthPyramid,
@@ -27,9 +28,11 @@ __version__ = "0.1.0"
 
 __all__ = [
     "ArgumentError",
+    "BruteForceTracer",
     "Camera",
     "DepthPyramid",
     "EmbreeError",
+    "EmbreeTracer",
     "GBuffer",
     "Hits",
     "HybridRTError",
@@ -41,7 +44,9 @@ __all__ = [
     "Rays",
     "Scene",
     "UnknownNameError",
+    "embree_info",
     "load_scene",
+    "packet_available",
     "project",
     "read_mesh",
     "unproject",
