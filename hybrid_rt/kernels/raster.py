@@ -452,25 +452,44 @@ def draw(record, ints, floats, left, top, right, bottom, cx, cy, keys):
     nearest = floats[record, 4]
     rank = OLD - 1 - record
     x = i0 + 0.5 - cx
-    for j in range(j1 - j0 + 1):
-        row = centre + ddy * ((j0 + j) + 0.5 - cy)
-        f0 = np.int32(e0 + b0 * j)
-        f1 = np.int32(e1 + b1 * j)
-        f2 = np.int32(e2 + b2 * j)
-        start = (j0 - top + j) * STRIDE + (i0 - left)
-        if narrow:
+    if narrow:
+        for j in range(j1 - j0 + 1):
+            start = (j0 - top + j) * STRIDE + (i0 - left)
             draw_pixels(
-                NARROW, f0, f1, f2, a0, a1, a2, row, ddx, x, farthest, nearest, rank,
+                NARROW, np.int32(e0 + b0 * j), np.int32(e1 + b1 * j), np.int32(e2 + b2 * j),
+                a0, a1, a2, centre + ddy * ((j0 + j) + 0.5 - cy), ddx, x, farthest, nearest, rank,
                 keys[start : start + NARROW],
             )  # fmt: skip
-            continue
-        for block in range((i1 - i0 + 1) // BLOCK):
-            i = np.int32(block * BLOCK)
-            draw_pixels(
-                BLOCK, np.int32(f0 + a0 * i), np.int32(f1 + a1 * i), np.int32(f2 + a2 * i),
-                a0, a1, a2, row, ddx, x + i, farthest, nearest, rank,
-                keys[start + i : start + i + BLOCK],
-            )  # fmt: skip
+        return
+    # What an edge gains at most and at least over a block.
+    most0 = np.int32(max(a0, 0) * (BLOCK - 1))
+    most1 = np.int32(max(a1, 0) * (BLOCK - 1))
+    most2 = np.int32(max(a2, 0) * (BLOCK - 1))
+    least0 = np.int32(min(a0, 0) * (BLOCK - 1))
+    least1 = np.int32(min(a1, 0) * (BLOCK - 1))
+    least2 = np.int32(min(a2, 0) * (BLOCK - 1))
+    # Column by column: what a block is, empty, full or mixed, changes seldom on the way down.
+    for i in range(0, i1 - i0 + 1, BLOCK):
+        for j in range(j1 - j0 + 1):
+            f0 = np.int32(e0 + a0 * i + b0 * j)
+            f1 = np.int32(e1 + a1 * i + b1 * j)
+            f2 = np.int32(e2 + a2 * i + b2 * j)
+            if (np.int32(f0 + most0) | np.int32(f1 + most1) | np.int32(f2 + most2)) < 0:
+                continue
+            row = centre + ddy * ((j0 + j) + 0.5 - cy)
+            start = (j0 - top + j) * STRIDE + (i0 - left) + i
+            block = keys[start : start + BLOCK]
+            if (np.int32(f0 + least0) | np.int32(f1 + least1) | np.int32(f2 + least2)) >= 0:
+                zero = np.int32(0)
+                draw_pixels(
+                    BLOCK, zero, zero, zero, zero, zero, zero,
+                    row, ddx, x + i, farthest, nearest, rank, block,
+                )  # fmt: skip
+            else:
+                draw_pixels(
+                    BLOCK, f0, f1, f2, a0, a1, a2,
+                    row, ddx, x + i, farthest, nearest, rank, block,
+                )  # fmt: skip
 
 
 @parallel_kernel
