@@ -9,6 +9,7 @@ from hybrid_rt.errors import (
     UnknownNameError,
 )
 from hybrid_rt.io import read_mesh
+from hybrid_rt.metrics import Judged, Rate, Verdict, alpha, by_status, judge, rates
 from hybrid_rt.scene import load_scene
 from hybrid_rt.trace import BruteForceTracer, EmbreeTracer, embree_info, packet_available
 from hybrid_rt.types import (
@@ -37,17 +38,24 @@ __all__ = [
     "Hits",
     "HybridRTError",
     "HybridResult",
+    "Judged",
     "MarchStatus",
     "Marched",
     "Mesh",
     "MeshFileError",
+    "Rate",
     "Rays",
     "Scene",
     "UnknownNameError",
+    "Verdict",
+    "alpha",
+    "by_status",
     "embree_info",
+    "judge",
     "load_scene",
     "packet_available",
     "project",
+    "rates",
     "read_mesh",
     "unproject",
 ]
