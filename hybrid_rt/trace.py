@@ -11,16 +11,22 @@ from typing import Any
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid_rt import _check
 from hybrid_rt.embree import QUALITIES, WIDTHS, NativeScene, embree_info, packet_available
+from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels import embree as embree_kernels
 from hybrid_rt.kernels import trace as kernels
-from hybrid_rt.types import Bool, Hits, Rays, Scene
+from hybrid_rt.types import F32, Bool, Hits, Rays, Scene
 
 __all__ = ["BruteForceTracer", "EmbreeTracer", "embree_info", "packet_available"]
 
 PATHS = ("packet", "run")
+
+# Embree's float32 products of coordinates leave its range beyond about 2**-45 and 2**45, and it
+# answers with misses; see test_scenes_beyond_the_range_of_embree_are_refused.
+SMALLEST_SCENE, LARGEST_SCENE = 2.0**-40, 2.0**40
 
 
 class EmbreeTracer:
@@ -47,7 +53,8 @@ class EmbreeTracer:
     Raises
     ------
     ArgumentError
-        An option that is not one of those above.
+        An option that is not one of those above; a scene so large or so small (beyond 2**40 or
+        2**-40) that Embree's arithmetic overflows or underflows.
     EmbreeError
         Path "packet" where the library cannot be reached (see `packet_available`), or an error that
         Embree reports.
@@ -82,6 +89,13 @@ class EmbreeTracer:
         _check.instance("scene", scene, Scene)
         _check.choice("build_quality", build_quality, QUALITIES)
         _check.choice("robust", robust, (True, False))
+        largest = float(np.abs(scene.vertices).max())
+        if largest != 0 and not SMALLEST_SCENE <= largest <= LARGEST_SCENE:
+            raise ArgumentError(
+                "scene",
+                f"a largest coordinate from {SMALLEST_SCENE:g} to {LARGEST_SCENE:g}",
+                f"{largest:g}",
+            )
         self._bvh = _Bvh(scene, _thread_count(threads), bool(robust), build_quality)
         self._set_path(path, width, coherent, threads)
 
@@ -168,7 +182,7 @@ class EmbreeTracer:
         -------
         Hits
         """
-        _check.instance("rays", rays, Rays)
+        rays = _checked(rays)
         if self._path == "run":
             return self._bvh.embreex.intersect(rays, self.threads)
         with _numba_threads(self.threads) as workers:
@@ -178,7 +192,7 @@ class EmbreeTracer:
 
     def occluded(self, rays: Rays) -> Bool:
         """Return, as (N,) bool, whether each ray hits anything between its t_near and t_far."""
-        _check.instance("rays", rays, Rays)
+        rays = _checked(rays)
         if self._path == "run":
             return self._bvh.embreex.occluded(rays, self.threads)
         with _numba_threads(self.threads) as workers:
@@ -208,6 +222,7 @@ class BruteForceTracer:
         _check.instance("scene", scene, Scene)
         _thread_count(threads)
         self._scene, self._threads = scene, threads
+        self._vertices, self._faces = _kernel_array(scene.vertices), _kernel_array(scene.faces)
 
     @property
     def threads(self) -> int:
@@ -221,12 +236,12 @@ class BruteForceTracer:
 
     def intersect(self, rays: Rays) -> Hits:
         """Return the nearest hit of each ray."""
-        _check.instance("rays", rays, Rays)
+        rays = _checked(rays)
         hits = Hits.empty(len(rays))
         with _numba_threads(self.threads):
             kernels.nearest(
                 rays.origin, rays.direction, rays.t_near, rays.t_far,
-                self._scene.vertices, self._scene.faces,
+                self._vertices, self._faces,
                 hits.t, hits.prim_id, hits.u, hits.v, hits.n_g,
             )  # fmt: skip
         return hits
@@ -275,10 +290,15 @@ class _EmbreexScene:
         self._scene.run(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32))
 
     def intersect(self, rays: Rays, threads: int) -> Hits:
-        usable = _usable(rays)
+        usable, scale = _usable(rays)
         if not usable.all():
             hits = Hits.empty(len(rays))
             _put(hits, usable, self.intersect(rays.take(usable), threads))
+            return hits
+        if (scale != 1).any():
+            hits = self.intersect(_scaled(rays, scale), threads)
+            with np.errstate(over="ignore"):
+                np.multiply(hits.t, scale, out=hits.t)
             return hits
         hits = self._from_zero(rays, threads)
         early = np.flatnonzero(hits.t < rays.t_near)
@@ -288,7 +308,9 @@ class _EmbreexScene:
 
     def occluded(self, rays: Rays, threads: int) -> Bool:
         hit = np.zeros(len(rays), np.bool_)
-        usable = _usable(rays)
+        usable, scale = _usable(rays)
+        if (scale != 1).any():
+            return self.occluded(_scaled(rays, scale), threads)
         # A hit before t_near would end an occlusion query, so rays with one ask for the hit.
         late = usable & (rays.t_near > 0)
         hit[late] = self.intersect(rays.take(late), threads).prim_id >= 0
@@ -342,11 +364,23 @@ def _put(hits: Hits, where: Any, values: Hits) -> None:
         getattr(hits, name)[where] = getattr(values, name)
 
 
-def _usable(rays: Rays) -> Bool:
-    """Return which rays may be given to Embree."""
-    usable = np.empty(len(rays), np.bool_)
-    embree_kernels.usable(rays.origin, rays.direction, rays.t_near, rays.t_far, usable)
-    return usable
+def _usable(rays: Rays) -> tuple[Bool, F32]:
+    """Return which rays may be given to Embree, and the factors that their directions need."""
+    usable, scale = np.empty(len(rays), np.bool_), np.empty(len(rays), np.float32)
+    embree_kernels.usable(rays.origin, rays.direction, rays.t_near, rays.t_far, usable, scale)
+    return usable, scale
+
+
+def _scaled(rays: Rays, scale: F32) -> Rays:
+    """Return the same rays with directions multiplied by powers of two."""
+    with np.errstate(over="ignore"):
+        return Rays(
+            rays.origin,
+            rays.direction * scale[:, None],
+            rays.pixel,
+            rays.t_near / scale,
+            rays.t_far / scale,
+        )
 
 
 def _in_chunks(work: Callable[[slice], None], n: int, size: int, threads: int) -> None:
@@ -357,6 +391,29 @@ def _in_chunks(work: Callable[[slice], None], n: int, size: int, threads: int) -
     else:
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(work, slices))
+
+
+def _checked(rays: Rays) -> Rays:
+    """Return rays whose arrays a kernel may have: a length that differs would be read past."""
+    _check.instance("rays", rays, Rays)
+    n = len(rays)
+    arrays = []
+    for name, shape, dtype in (
+        ("origin", ("N", 3), np.float32),
+        ("direction", ("N", 3), np.float32),
+        ("pixel", ("N", 2), np.int32),
+        ("t_near", ("N",), np.float32),
+        ("t_far", ("N",), np.float32),
+    ):
+        value = _check.array(f"rays.{name}", getattr(rays, name), shape, dtype)
+        _check.same_length(f"rays.{name}", value, "rays.origin", n)
+        arrays.append(_kernel_array(value))
+    return Rays(*arrays)
+
+
+def _kernel_array(value: NDArray[Any]) -> NDArray[Any]:
+    # A read-only array has a type of its own in Numba and would compile every kernel again.
+    return np.require(value, requirements=["C", "W"])
 
 
 def _thread_count(threads: int | None) -> int:
