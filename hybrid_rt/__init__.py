@@ -8,8 +8,14 @@ from hybrid_rt.errors import (
     MeshFileError,
     UnknownNameError,
 )
+from hybrid_rt.hybrid import trace_hybrid
 from hybrid_rt.io import read_mesh
+from hybrid_rt.march import march
+from hybrid_rt.pyramid import build_depth_pyramid
+from hybrid_rt.raster import rasterize
+from hybrid_rt.rays import mirror_rays
 from hybrid_rt.scene import load_scene
+from hybrid_rt.trace import BruteForceTracer, EmbreeTracer, embree_info, packet_available
 from hybrid_rt.types import (
     Camera,
     DepthPyramid,
@@ -27,9 +33,11 @@ __version__ = "0.1.0"
 
 __all__ = [
     "ArgumentError",
+    "BruteForceTracer",
     "Camera",
     "DepthPyramid",
     "EmbreeError",
+    "EmbreeTracer",
     "GBuffer",
     "Hits",
     "HybridRTError",
@@ -41,8 +49,15 @@ __all__ = [
     "Rays",
     "Scene",
     "UnknownNameError",
+    "build_depth_pyramid",
+    "embree_info",
     "load_scene",
+    "march",
+    "mirror_rays",
+    "packet_available",
     "project",
+    "rasterize",
     "read_mesh",
+    "trace_hybrid",
     "unproject",
 ]

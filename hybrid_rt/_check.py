@@ -29,7 +29,7 @@ def _shape_text(shape: tuple[int | str, ...]) -> str:
 def array(
     argument: str, value: Any, shape: tuple[int | str, ...], dtype: type[np.generic]
 ) -> NDArray[Any]:
-    """Return `value` as a C-contiguous array of `dtype`, converted only within its kind.
+    """Return `value` as a C-contiguous array of `dtype`, converted where no meaning is lost.
 
     Parameters
     ----------
@@ -40,8 +40,8 @@ def array(
     shape : tuple of int or str
         Expected shape; a string stands for any length ("N"), the same string for the same length.
     dtype : type
-        Wanted dtype. Floating targets take any floating input (float64 is rounded), integer targets
-        take any integer input that fits, bool takes bool.
+        Wanted dtype. Floating targets take real numbers (float64 is rounded), integer targets take
+        any integer input that fits, bool takes bool.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def array(
         arr = np.asarray(value)
     except (ValueError, TypeError) as error:
         raise ArgumentError(argument, expected, describe(value)) from error
-    kinds = {"f": "f", "i": "iu", "u": "iu", "b": "b"}[want.kind]
+    kinds = {"f": "fiu", "i": "iu", "u": "iu", "b": "b"}[want.kind]
     if arr.dtype.kind not in kinds:
         raise ArgumentError(argument, expected, describe(arr))
     lengths: dict[str, int] = {}

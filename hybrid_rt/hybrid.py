@@ -1,0 +1,134 @@
+"""March every ray first, trace those that the screen cannot answer."""
+
+from __future__ import annotations
+
+import time
+from typing import Literal, Protocol
+
+import numpy as np
+
+from hybrid_rt import _threads
+from hybrid_rt.kernels import hybrid as kernels
+from hybrid_rt.march import march
+from hybrid_rt.types import I64, Bool, DepthPyramid, GBuffer, Hits, HybridResult, Rays
+
+
+class Tracer(Protocol):
+    """Whatever answers rays exactly."""
+
+    def intersect(self, rays: Rays) -> Hits:
+        """Return the nearest hit of each ray."""
+        ...
+
+
+def trace_hybrid(
+    rays: Rays,
+    gbuffer: GBuffer,
+    pyramid: DepthPyramid,
+    tracer: Tracer,
+    mode: Literal["paper"] = "paper",
+    *,
+    samples: int = 4,
+    max_steps: int | None = None,
+    threads: int | None = None,
+) -> HybridResult:
+    """Return the hit of every ray, from the screen where it answers and from `tracer` elsewhere.
+
+    Parameters
+    ----------
+    rays : Rays
+        N rays, world.
+    gbuffer : GBuffer
+    pyramid : DepthPyramid
+        Of `gbuffer`.
+    tracer : Tracer
+        An `EmbreeTracer`, a `BruteForceTracer` or anything with their `intersect`, over the scene
+        of `gbuffer`.
+    mode, samples, max_steps, threads
+        As in `march`; the tracer keeps its own number of threads.
+
+    Returns
+    -------
+    HybridResult
+        N hits of the same kind as a tracer's. Where the march answered, t is the distance to the
+        pixel's tilted plane, and u, v are the barycentrics of that point in the pixel's primitive:
+        a pixel is answered and not a triangle, so they may lie outside [0, 1].
+
+    Notes
+    -----
+    Unresolved rays are traced in their order, so that neighbours stay neighbours. `timings` holds
+    wall-clock seconds, without JIT compilation only from the second call on.
+    """
+    clock = [time.perf_counter()]
+    marched = march(
+        rays, gbuffer, pyramid, mode=mode, samples=samples, max_steps=max_steps, threads=threads
+    )
+    clock.append(time.perf_counter())
+    resolved = marched.resolved
+    with _threads.limited(threads):
+        starts, rest = _compact(rays, resolved)
+        clock.append(time.perf_counter())
+        traced = tracer.intersect(rest)
+        clock.append(time.perf_counter())
+        n = len(rays)
+        hits = Hits(
+            np.empty(n, np.float32),
+            np.empty(n, np.int32),
+            np.empty(n, np.float32),
+            np.empty(n, np.float32),
+            np.empty((n, 3), np.float32),
+        )
+        kernels.merge(
+            resolved,
+            starts,
+            rays.origin,
+            rays.direction,
+            marched.prim_id,
+            marched.t,
+            gbuffer.scene.vertices,
+            gbuffer.scene.faces,
+            traced.t,
+            traced.prim_id,
+            traced.u,
+            traced.v,
+            traced.n_g,
+            hits.t,
+            hits.prim_id,
+            hits.u,
+            hits.v,
+            hits.n_g,
+        )
+        clock.append(time.perf_counter())
+    stages = ("march", "compaction", "fallback", "merge")
+    timings = {stage: clock[k + 1] - clock[k] for k, stage in enumerate(stages)}
+    return HybridResult(hits, resolved, marched.status, marched.pixel, timings)
+
+
+def _compact(rays: Rays, resolved: Bool) -> tuple[I64, Rays]:
+    """Return, for each chunk, how many unresolved rays come before it, and the unresolved rays."""
+    counts = np.empty(-(-len(rays) // kernels.CHUNK), np.int64)
+    kernels.count_unresolved(resolved, counts)
+    m = int(counts.sum())
+    starts = np.cumsum(counts) - counts
+    rest = Rays(
+        np.empty((m, 3), np.float32),
+        np.empty((m, 3), np.float32),
+        np.empty((m, 2), np.int32),
+        np.empty(m, np.float32),
+        np.empty(m, np.float32),
+    )
+    kernels.compact(
+        resolved,
+        starts,
+        rays.origin,
+        rays.direction,
+        rays.pixel,
+        rays.t_near,
+        rays.t_far,
+        rest.origin,
+        rest.direction,
+        rest.pixel,
+        rest.t_near,
+        rest.t_far,
+    )
+    return starts, rest

@@ -1,0 +1,198 @@
+"""From world vertices to fixed-point screen coordinates, and the clipping that keeps them finite.
+
+A vertex is ``q = M (p - eye)`` in float64: x_px = q0 / q2, y_px = q1 / q2, z_view = q2. Screen
+coordinates are snapped to 1/256 pixel. The guard band bounds them, so that every edge function of
+`hybrid_rt.kernels.raster` fits its integers; it is wide enough that clipping against it is rare.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+
+SUBPIXEL_BITS = 8
+ONE = 1 << SUBPIXEL_BITS
+HALF = ONE >> 1
+
+GUARD_LOW = -32768.0
+"""Smallest screen coordinate in pixels that is snapped without clipping."""
+GUARD_HIGH = 65536.0
+"""Largest one; the screen itself ends at 32768."""
+
+OUT_LEFT, OUT_RIGHT, OUT_TOP, OUT_BOTTOM = 1, 2, 4, 8
+OUT_NEAR = 16
+OUT_GUARD = 32
+OUT_SCREEN = OUT_LEFT | OUT_RIGHT | OUT_TOP | OUT_BOTTOM | OUT_NEAR
+NEEDS_CLIP = OUT_NEAR | OUT_GUARD
+
+MAX_CORNERS = 8
+"""A triangle cut by five planes has at most eight corners."""
+
+
+@inlined
+def to_screen(p0, p1, p2, eye, m):
+    """Return q = M (p - eye) of a world point."""
+    r0 = np.float64(p0) - eye[0]
+    r1 = np.float64(p1) - eye[1]
+    r2 = np.float64(p2) - eye[2]
+    return (
+        m[0, 0] * r0 + m[0, 1] * r1 + m[0, 2] * r2,
+        m[1, 0] * r0 + m[1, 1] * r1 + m[1, 2] * r2,
+        m[2, 0] * r0 + m[2, 1] * r1 + m[2, 2] * r2,
+    )
+
+
+@inlined
+def snap(x):
+    """Return a screen coordinate in units of 1/256 pixel; halves go up."""
+    return np.int32(np.floor(x * ONE + 0.5))
+
+
+@parallel_kernel
+def transform_vertices(vertices, eye, m, width, height, near, xy, out):
+    """Snap all vertices: (V, 3) float32 world -> xy (V, 2) int32, out (V,) uint8 of OUT_ bits.
+
+    `xy` is meaningless where `out` has a bit of NEEDS_CLIP.
+    """
+    w = np.float64(width)
+    h = np.float64(height)
+    for i in prange(len(vertices)):
+        q0, q1, q2 = to_screen(vertices[i, 0], vertices[i, 1], vertices[i, 2], eye, m)
+        bits = 0
+        # Tests in homogeneous form hold on both sides of the eye's plane.
+        if q0 < 0.0:
+            bits |= OUT_LEFT
+        if q0 > w * q2:
+            bits |= OUT_RIGHT
+        if q1 < 0.0:
+            bits |= OUT_TOP
+        if q1 > h * q2:
+            bits |= OUT_BOTTOM
+        # Written so that a NaN, which finite input cannot make, would be clipped away.
+        if not q2 >= near:
+            bits |= OUT_NEAR
+            xy[i, 0] = 0
+            xy[i, 1] = 0
+        else:
+            x = q0 / q2
+            y = q1 / q2
+            if x >= GUARD_LOW and x <= GUARD_HIGH and y >= GUARD_LOW and y <= GUARD_HIGH:
+                xy[i, 0] = snap(x)
+                xy[i, 1] = snap(y)
+            else:
+                bits |= OUT_GUARD
+                xy[i, 0] = 0
+                xy[i, 1] = 0
+        out[i] = bits
+
+
+@inlined
+def _distance(plane, q0, q1, q2, near):
+    """Return the signed distance of q, up to scale, inside the clip plane number `plane`."""
+    if plane == 0:
+        return q2 - near
+    if plane == 1:
+        return q0 - GUARD_LOW * q2
+    if plane == 2:
+        return GUARD_HIGH * q2 - q0
+    if plane == 3:
+        return q1 - GUARD_LOW * q2
+    return GUARD_HIGH * q2 - q1
+
+
+@inlined
+def _before(q, a, b):
+    """Is corner `a` before corner `b` in the lexicographic order of coordinates."""
+    if q[a, 0] != q[b, 0]:
+        return q[a, 0] < q[b, 0]
+    if q[a, 1] != q[b, 1]:
+        return q[a, 1] < q[b, 1]
+    return q[a, 2] < q[b, 2]
+
+
+@kernel
+def clip_plane(plane, near, q, n, result):
+    """Clip the convex polygon q[:n] against one plane into `result`; return its corner count.
+
+    A cut edge is interpolated from its lexicographically first end whichever way it is walked, so
+    both triangles at an edge get the same bits and stay watertight.
+    """
+    count = 0
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        di = _distance(plane, q[i, 0], q[i, 1], q[i, 2], near)
+        dj = _distance(plane, q[j, 0], q[j, 1], q[j, 2], near)
+        if di >= 0.0:
+            result[count, 0] = q[i, 0]
+            result[count, 1] = q[i, 1]
+            result[count, 2] = q[i, 2]
+            count += 1
+        if (di >= 0.0) != (dj >= 0.0):
+            if _before(q, i, j):
+                a, b, da, db = i, j, di, dj
+            else:
+                a, b, da, db = j, i, dj, di
+            t = da / (da - db)
+            result[count, 0] = q[a, 0] + t * (q[b, 0] - q[a, 0])
+            result[count, 1] = q[a, 1] + t * (q[b, 1] - q[a, 1])
+            result[count, 2] = near if plane == 0 else q[a, 2] + t * (q[b, 2] - q[a, 2])
+            count += 1
+    return count
+
+
+@inlined
+def _doubled_area(p, a, b, c):
+    return np.int64(p[b, 0] - p[a, 0]) * np.int64(p[c, 1] - p[a, 1]) - np.int64(
+        p[b, 1] - p[a, 1]
+    ) * np.int64(p[c, 0] - p[a, 0])
+
+
+@kernel
+def clip_triangle(vertices, faces, face, eye, m, near, q, spare, corners):
+    """Clip one triangle; return how many corners its snapped polygon has.
+
+    q, spare (MAX_CORNERS + 1, 3) float64 are scratch; corners (MAX_CORNERS + 1, 2) int32 comes out
+    with a first corner from which the polygon can be cut into a fan.
+    """
+    for k in range(3):
+        v = faces[face, k]
+        q[k, 0], q[k, 1], q[k, 2] = to_screen(
+            vertices[v, 0], vertices[v, 1], vertices[v, 2], eye, m
+        )
+    n = 3
+    for plane in range(5):
+        n = clip_plane(plane, near, q, n, spare)
+        q, spare = spare, q
+        if n < 3:
+            return 0
+    for k in range(n):
+        # Interpolation may end a rounding error outside of the guard band.
+        spare[k, 0] = snap(min(max(q[k, 0] / q[k, 2], GUARD_LOW), GUARD_HIGH))
+        spare[k, 1] = snap(min(max(q[k, 1] / q[k, 2], GUARD_LOW), GUARD_HIGH))
+    root = _fan_root(spare, n)
+    for k in range(n):
+        at = (root + k) % n
+        corners[k, 0] = np.int32(spare[at, 0])
+        corners[k, 1] = np.int32(spare[at, 1])
+    return n
+
+
+@inlined
+def _fan_root(p, n):
+    """Return a corner from which all triangles of the fan turn one way, 0 if there is none.
+
+    Snapping can dent a convex polygon by a fraction of a sub-pixel; a fan from a wrong corner would
+    then cover a bit of the neighbour.
+    """
+    for root in range(n):
+        positive = False
+        negative = False
+        for k in range(1, n - 1):
+            area = _doubled_area(p, root, (root + k) % n, (root + k + 1) % n)
+            positive |= area > 0
+            negative |= area < 0
+        if not (positive and negative):
+            return root
+    return 0

@@ -1,0 +1,203 @@
+"""Embree's ray queries from compiled loops.
+
+Embree's functions come as addresses in int64 arguments, never as globals, so that the machine code
+holds nothing of this process and can be cached on disk.
+
+A packet of `width` rays is field by field in memory (RTCRayHit4/8/16), and for width 1 that is the
+layout of RTCRayHit too: origin 0 to 2, tnear 3, direction 4 to 6, time 7, tfar 8, mask 9, id 10,
+flags 11, Ng 12 to 14, u 15, v 16, primID 17, geomID 18, instID 19. Embree built with instance
+arrays has instPrimID as field 20; room is kept for it either way.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from llvmlite import ir
+from numba import prange, types
+from numba.extending import intrinsic
+
+from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+
+FIELDS = 21
+CHUNK = 512  # rays that a thread takes at a time; a multiple of every width
+
+
+@intrinsic
+def _call3(typingctx, function, a, b, c):
+    """Call ``void function(a, b, c)`` at an address; all arguments are pointers as int64."""
+    return _signature_of(3), _generator_of(3)
+
+
+@intrinsic
+def _call4(typingctx, function, a, b, c, d):
+    """Call ``void function(a, b, c, d)`` at an address; all arguments are pointers as int64."""
+    return _signature_of(4), _generator_of(4)
+
+
+def _signature_of(count):
+    return types.void(*[types.int64] * (count + 1))
+
+
+def _generator_of(count):
+    def generate(context, builder, signature, arguments):
+        word = ir.IntType(64)
+        function_type = ir.FunctionType(ir.VoidType(), [word] * count)
+        target = builder.inttoptr(arguments[0], function_type.as_pointer())
+        builder.call(target, arguments[1:])
+        return context.get_dummy_value()
+
+    return generate
+
+
+@intrinsic
+def _fetch_add(typingctx, address, value):
+    """Add `value` to the int64 at `address` in one atomic step and return what was there before."""
+
+    def generate(context, builder, signature, arguments):
+        pointer = builder.inttoptr(arguments[0], ir.IntType(64).as_pointer())
+        return builder.atomic_rmw("add", pointer, arguments[1], "monotonic")
+
+    return types.int64(types.int64, types.int64), generate
+
+
+@inlined
+def _aligned(words):
+    """Return `words` float32 that start at a multiple of 64 bytes, as packets of 16 must."""
+    raw = np.zeros(words + 16, np.float32)
+    start = (-raw.ctypes.data % 64) // 4
+    return raw[start : start + words]
+
+
+@inlined
+def _usable(o, d, near, far):
+    """Whether a ray may go to Embree: finite, with a direction, and not empty."""
+    finite = (
+        math.isfinite(o[0])
+        and math.isfinite(o[1])
+        and math.isfinite(o[2])
+        and math.isfinite(d[0])
+        and math.isfinite(d[1])
+        and math.isfinite(d[2])
+    )
+    aimed = d[0] != 0 or d[1] != 0 or d[2] != 0
+    return finite and aimed and math.isfinite(near) and near <= far
+
+
+@inlined
+def _load(first, width, origin, direction, t_near, t_far, packet, words, valid):
+    """Fill a packet from ray `first` on; return whether any of its lanes is valid."""
+    n = len(origin)
+    some = False
+    for k in range(width):
+        i = first + k
+        if i < n and _usable(origin[i], direction[i], t_near[i], t_far[i]):
+            some = True
+            valid[k] = -1
+            packet[k] = origin[i, 0]
+            packet[width + k] = origin[i, 1]
+            packet[2 * width + k] = origin[i, 2]
+            packet[3 * width + k] = t_near[i]
+            packet[4 * width + k] = direction[i, 0]
+            packet[5 * width + k] = direction[i, 1]
+            packet[6 * width + k] = direction[i, 2]
+            packet[8 * width + k] = t_far[i]
+            words[9 * width + k] = -1
+        else:
+            valid[k] = 0
+            for field in range(10):
+                packet[field * width + k] = 0.0
+        for field in range(17, FIELDS):
+            words[field * width + k] = -1
+    return some
+
+
+@inlined
+def _store(first, width, packet, words, t, prim_id, u, v, n_g):
+    """Write the hits of a packet; what Embree left in the fields of a miss is not looked at."""
+    for k in range(min(width, len(t) - first)):
+        i = first + k
+        if words[18 * width + k] == 0:  # the one geometry of the scene
+            t[i] = packet[8 * width + k]
+            prim_id[i] = words[17 * width + k]
+            n_g[i, 0] = packet[12 * width + k]
+            n_g[i, 1] = packet[13 * width + k]
+            n_g[i, 2] = packet[14 * width + k]
+            u[i] = packet[15 * width + k]
+            v[i] = packet[16 * width + k]
+        else:
+            _miss(i, t, prim_id, u, v, n_g)
+
+
+@inlined
+def _miss(i, t, prim_id, u, v, n_g):
+    t[i] = np.inf
+    prim_id[i] = -1
+    u[i] = 0.0
+    v[i] = 0.0
+    n_g[i, 0] = 0.0
+    n_g[i, 1] = 0.0
+    n_g[i, 2] = 0.0
+
+
+@inlined
+def _query(function, scene, arguments, width, packet, valid):
+    if width == 1:
+        _call3(function, scene, packet.ctypes.data, arguments)
+    else:
+        _call4(function, valid.ctypes.data, scene, packet.ctypes.data, arguments)
+
+
+@parallel_kernel
+def intersect(
+    function, scene, arguments, width, workers,
+    origin, direction, t_near, t_far,
+    t, prim_id, u, v, n_g,
+):  # fmt: skip
+    """Nearest hits of (N, 3) rays by rtcIntersect1/4/8/16.
+
+    `function`, `scene` and `arguments` are addresses: the call for `width`, the RTCScene and the
+    RTCIntersectArguments. `workers` threads take chunks of rays from a common counter, since a
+    chunk of sky costs a fraction of a chunk of foliage; which thread traces a ray does not show.
+    """
+    taken = np.zeros(1, np.int64)
+    for _ in prange(workers):
+        packet = _aligned(FIELDS * width)
+        words = packet.view(np.int32)
+        valid = _aligned(width).view(np.int32)
+        start = _fetch_add(taken.ctypes.data, CHUNK)
+        while start < len(origin):
+            for first in range(start, min(start + CHUNK, len(origin)), width):
+                if _load(first, width, origin, direction, t_near, t_far, packet, words, valid):
+                    _query(function, scene, arguments, width, packet, valid)
+                _store(first, width, packet, words, t, prim_id, u, v, n_g)
+            start = _fetch_add(taken.ctypes.data, CHUNK)
+
+
+@parallel_kernel
+def occluded(
+    function, scene, arguments, width, workers, origin, direction, t_near, t_far, hit
+):  # fmt: skip
+    """Whether (N, 3) rays hit anything, by rtcOccluded1/4/8/16; arguments as in `intersect`."""
+    taken = np.zeros(1, np.int64)
+    for _ in prange(workers):
+        packet = _aligned(FIELDS * width)
+        words = packet.view(np.int32)
+        valid = _aligned(width).view(np.int32)
+        start = _fetch_add(taken.ctypes.data, CHUNK)
+        while start < len(origin):
+            for first in range(start, min(start + CHUNK, len(origin)), width):
+                if _load(first, width, origin, direction, t_near, t_far, packet, words, valid):
+                    _query(function, scene, arguments, width, packet, valid)
+                for k in range(min(width, len(origin) - first)):
+                    # Embree writes tfar = -inf for an occluded ray and leaves a masked lane alone.
+                    hit[first + k] = packet[8 * width + k] == -np.inf
+            start = _fetch_add(taken.ctypes.data, CHUNK)
+
+
+@kernel
+def usable(origin, direction, t_near, t_far, out):
+    """Set `out` (N,) bool where a ray may be given to Embree."""
+    for i in range(len(origin)):
+        out[i] = _usable(origin[i], direction[i], t_near[i], t_far[i])

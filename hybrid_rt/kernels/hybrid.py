@@ -1,0 +1,152 @@
+"""Split the rays between the screen and the tracer, and put the answers together again."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from hybrid_rt.kernels._jit import kernel, parallel_kernel
+
+CHUNK = 4096  # rays counted together
+
+
+@parallel_kernel
+def count_unresolved(resolved, counts):
+    """Count the unresolved rays of each chunk; resolved (N,) bool, counts (chunks,) int64."""
+    n = resolved.shape[0]
+    for chunk in prange(counts.shape[0]):
+        count = 0
+        for i in range(chunk * CHUNK, min(n, (chunk + 1) * CHUNK)):
+            if not resolved[i]:
+                count += 1
+        counts[chunk] = count
+
+
+@parallel_kernel
+def compact(
+    resolved,
+    starts,
+    origin,
+    direction,
+    pixel,
+    t_near,
+    t_far,
+    origin_out,
+    direction_out,
+    pixel_out,
+    t_near_out,
+    t_far_out,
+):
+    """Copy the unresolved rays together, in their order; starts (chunks,) int64."""
+    n = resolved.shape[0]
+    for chunk in prange(starts.shape[0]):
+        j = starts[chunk]
+        for i in range(chunk * CHUNK, min(n, (chunk + 1) * CHUNK)):
+            if not resolved[i]:
+                for axis in range(3):
+                    origin_out[j, axis] = origin[i, axis]
+                    direction_out[j, axis] = direction[i, axis]
+                pixel_out[j, 0] = pixel[i, 0]
+                pixel_out[j, 1] = pixel[i, 1]
+                t_near_out[j] = t_near[i]
+                t_far_out[j] = t_far[i]
+                j += 1
+
+
+@kernel
+def barycentrics(ax, ay, az, bx, by, bz, cx, cy, cz, nx, ny, nz, px, py, pz):
+    """Return (u, v) of a point of the plane of triangle abc, n being cross(b - a, c - a)."""
+    inv = 1.0 / (nx * nx + ny * ny + nz * nz)
+    qx, qy, qz = px - ax, py - ay, pz - az
+    e1x, e1y, e1z = bx - ax, by - ay, bz - az
+    e2x, e2y, e2z = cx - ax, cy - ay, cz - az
+    u = ((qy * e2z - qz * e2y) * nx + (qz * e2x - qx * e2z) * ny + (qx * e2y - qy * e2x) * nz) * inv
+    v = ((e1y * qz - e1z * qy) * nx + (e1z * qx - e1x * qz) * ny + (e1x * qy - e1y * qx) * nz) * inv
+    return u, v
+
+
+@kernel
+def answer(i, origin, direction, prim, distance, vertices, faces, t, prim_id, u, v, n_g):
+    """Write the hit of ray i on primitive `prim` at t = `distance`."""
+    a, b, c = faces[prim, 0], faces[prim, 1], faces[prim, 2]
+    ax, ay, az = np.float64(vertices[a, 0]), np.float64(vertices[a, 1]), np.float64(vertices[a, 2])
+    bx, by, bz = np.float64(vertices[b, 0]), np.float64(vertices[b, 1]), np.float64(vertices[b, 2])
+    cx, cy, cz = np.float64(vertices[c, 0]), np.float64(vertices[c, 1]), np.float64(vertices[c, 2])
+    nx = (by - ay) * (cz - az) - (bz - az) * (cy - ay)
+    ny = (bz - az) * (cx - ax) - (bx - ax) * (cz - az)
+    nz = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    uu, vv = barycentrics(
+        ax,
+        ay,
+        az,
+        bx,
+        by,
+        bz,
+        cx,
+        cy,
+        cz,
+        nx,
+        ny,
+        nz,
+        origin[i, 0] + np.float64(distance) * direction[i, 0],
+        origin[i, 1] + np.float64(distance) * direction[i, 1],
+        origin[i, 2] + np.float64(distance) * direction[i, 2],
+    )
+    t[i] = distance
+    prim_id[i] = prim
+    u[i] = uu
+    v[i] = vv
+    n_g[i, 0] = nx
+    n_g[i, 1] = ny
+    n_g[i, 2] = nz
+
+
+@parallel_kernel
+def merge(
+    resolved,
+    starts,
+    origin,
+    direction,
+    march_prim,
+    march_t,
+    vertices,
+    faces,
+    traced_t,
+    traced_prim,
+    traced_u,
+    traced_v,
+    traced_n_g,
+    t,
+    prim_id,
+    u,
+    v,
+    n_g,
+):
+    """Write every ray's hit, from the march where it resolved the ray, else from the tracer."""
+    n = resolved.shape[0]
+    for chunk in prange(starts.shape[0]):
+        j = starts[chunk]
+        for i in range(chunk * CHUNK, min(n, (chunk + 1) * CHUNK)):
+            if resolved[i]:
+                answer(
+                    i,
+                    origin,
+                    direction,
+                    march_prim[i],
+                    march_t[i],
+                    vertices,
+                    faces,
+                    t,
+                    prim_id,
+                    u,
+                    v,
+                    n_g,
+                )
+            else:
+                t[i] = traced_t[j]
+                prim_id[i] = traced_prim[j]
+                u[i] = traced_u[j]
+                v[i] = traced_v[j]
+                for axis in range(3):
+                    n_g[i, axis] = traced_n_g[j, axis]
+                j += 1

@@ -1,0 +1,371 @@
+"""The march of "Ray Tracing Algorithm Based on Screen Space Ray Marching", one ray at a time.
+
+On the screen a ray is ``(x, y, depth)(s) = start + s * delta`` with
+``s = (t - t_near) / z_view(t)``: for q(t) = M (o + t d - eye) and q at t_near = (x z, y z, z),
+
+    x(s) = x + s (qd_x - x qd_z),   depth(s) = depth (1 - s qd_z),   t - t_near = s z / (1 - s qd_z)
+
+which needs no end point and stays finite as t goes to infinity (s = 1 / qd_z, depth = 0).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import prange
+
+from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+
+HIT, MISS, OFFSCREEN, HIDDEN, NEAR, EXHAUSTED, INVALID = range(7)  # types.MarchStatus
+
+CHUNK = 1024  # rays that one thread takes at a time
+STRANDS = 64  # a strand is every STRANDS-th chunk, so that a thread's share covers the whole image
+
+F0 = np.float32(0.0)
+F1 = np.float32(1.0)
+HALF = np.float32(0.5)
+INF = np.float32(np.inf)
+
+
+@kernel
+def screen_ray(ox, oy, oz, dx, dy, dz, t_near, t_far, m, eye, near, width, height):
+    """Return (status, x, y, depth, delta x, y, depth, s_end, z, qd_z); paper: "Initialise".
+
+    `status` is how the ray ends if it meets nothing before `s_end`, the largest s inside the view
+    volume; where the ray cannot even start, s_end is negative and `status` says why.
+    """
+    length = dx * dx + dy * dy + dz * dz
+    finite = math.isfinite(ox + oy + oz) and math.isfinite(length)
+    if not (finite and length > 0.0 and t_near < math.inf and t_far >= t_near):
+        return INVALID, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0
+    px = ox + t_near * dx - eye[0]
+    py = oy + t_near * dy - eye[1]
+    pz = oz + t_near * dz - eye[2]
+    qx = m[0, 0] * px + m[0, 1] * py + m[0, 2] * pz
+    qy = m[1, 0] * px + m[1, 1] * py + m[1, 2] * pz
+    z = m[2, 0] * px + m[2, 1] * py + m[2, 2] * pz
+    if not z >= near:
+        return NEAR, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0
+    x, y = qx / z, qy / z
+    if not (0.0 <= x <= width and 0.0 <= y <= height):
+        return OFFSCREEN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0
+    gx = m[0, 0] * dx + m[0, 1] * dy + m[0, 2] * dz
+    gy = m[1, 0] * dx + m[1, 1] * dy + m[1, 2] * dz
+    gz = m[2, 0] * dx + m[2, 1] * dy + m[2, 2] * dz
+    depth = near / z
+    delta_x, delta_y, delta_depth = gx - x * gz, gy - y * gz, -depth * gz
+    status = MISS
+    s_end = math.inf
+    if gz > 0.0:
+        s_end = 1.0 / gz  # t = infinity
+    elif gz < 0.0:
+        status = NEAR
+        s_end = (near - z) / (gz * near)
+    if t_far < math.inf:
+        s_far = (t_far - t_near) / (z + (t_far - t_near) * gz)
+        if 0.0 <= s_far < s_end:  # negative: t_far lies behind the eye
+            status = MISS
+            s_end = s_far
+    if delta_x != 0.0:
+        s_side = ((width if delta_x > 0.0 else 0.0) - x) / delta_x
+        if s_side < s_end:
+            status = OFFSCREEN
+            s_end = s_side
+    if delta_y != 0.0:
+        s_side = ((height if delta_y > 0.0 else 0.0) - y) / delta_y
+        if s_side < s_end:
+            status = OFFSCREEN
+            s_end = s_side
+    return status, x, y, depth, delta_x, delta_y, delta_depth, s_end, z, gz
+
+
+@inlined
+def ray_t(s, z, gz, t_near):
+    """Return t of the screen parameter s; infinite where the ray has reached infinity."""
+    denominator = 1.0 - s * gz
+    if denominator <= 0.0:
+        return math.inf
+    return t_near + s * z / denominator
+
+
+@inlined
+def reciprocal(delta):
+    """Return (1 / delta, step of the cell, 1 for the cell's far edge) of a screen delta."""
+    if delta > F0:
+        return min(F1 / delta, INF), 1, 1
+    if delta < F0:
+        return F1 / delta, -1, 0
+    return INF, 0, 0
+
+
+@inlined
+def edge_s(edge, start, inv, step):
+    """Return the s at which the ray reaches a cell's edge; infinite for a ray that never moves."""
+    if step == 0 or math.isinf(inv):
+        return INF
+    return (np.float32(edge) - start) * inv
+
+
+@inlined
+def clamp(value, low, high):
+    """Return `value` limited to [low, high]."""
+    return low if value < low else (high if value > high else value)
+
+
+@kernel
+def tilted_plane_s(
+    i, j, depth, ddx, ddy, x0, y0, z0, dx, dy, dz, inv_x, inv_y, step_x, step_y, s_start, s_end
+):
+    """Return the s at which the ray meets the plane of pixel (i, j) inside that pixel, or -1.
+
+    The pixel is the plane ``depth + ddx (x - i - 1/2) + ddy (y - j - 1/2)``; the ray must reach it
+    from the observer's side. Paper: "Correct".
+    """
+    centre = depth[j, i]
+    if centre <= F0:
+        return np.float32(-1.0)
+    first, last = s_start, s_end
+    if step_x != 0 and not math.isinf(inv_x):
+        first = max(first, (np.float32(i + (step_x < 0)) - x0) * inv_x)
+        last = min(last, (np.float32(i + (step_x > 0)) - x0) * inv_x)
+    if step_y != 0 and not math.isinf(inv_y):
+        first = max(first, (np.float32(j + (step_y < 0)) - y0) * inv_y)
+        last = min(last, (np.float32(j + (step_y > 0)) - y0) * inv_y)
+    a, b = ddx[j, i], ddy[j, i]
+    # Height of the ray in front of the plane, linear in s: h(s) = h0 + s * hs.
+    h0 = z0 - (centre + a * (x0 - np.float32(i) - HALF) + b * (y0 - np.float32(j) - HALF))
+    hs = dz - (a * dx + b * dy)
+    in_front = h0 + first * hs
+    behind = h0 + last * hs
+    if in_front < F0 or behind > F0 or last < first:
+        return np.float32(-1.0)
+    if in_front == behind:
+        return first
+    return first + (last - first) * (in_front / (in_front - behind))
+
+
+@kernel
+def march_ray(
+    status,
+    x,
+    y,
+    z0,
+    dx,
+    dy,
+    dz,
+    s_end,
+    own_x,
+    own_y,
+    depth,
+    ddx,
+    ddy,
+    cells,
+    offsets,
+    widths,
+    samples,
+    max_steps,
+    steps_by_level,
+):
+    """March one ray; return (status, pixel x, pixel y, s of the hit, s proven free, steps)."""
+    height, width = depth.shape
+    top = offsets.shape[0] - 1
+    inv_x, step_x, far_x = reciprocal(dx)
+    inv_y, step_y, far_y = reciprocal(dy)
+    cx = clamp(int(x), 0, width - 1)
+    cy = clamp(int(y), 0, height - 1)
+    s = F0
+    level = 0
+    steps = 0
+    from_x = False  # the ray entered the current pixel through a vertical edge
+    # A ray on the visible surface of its own pixel leaves that pixel unread: the surface would
+    # only be compared with itself.
+    skip = cx == own_x and cy == own_y
+    while True:
+        blocked = False
+        for _ in range(samples):
+            lx, ly = cx >> level, cy >> level
+            edge_x, edge_y = (lx + far_x) << level, (ly + far_y) << level
+            sx = edge_s(edge_x, x, inv_x, step_x)
+            sy = edge_s(edge_y, y, inv_y, step_y)
+            s_exit = min(min(sx, sy), s_end)
+            if skip:
+                skip = False
+            else:
+                if steps == max_steps:
+                    return EXHAUSTED, -1, -1, F0, s, steps
+                steps += 1
+                steps_by_level[level] += 1
+                nearest = cells[offsets[level] + ly * widths[level] + lx]
+                farthest_ray = z0 + dz * (s_exit if dz < F0 else s)
+                if nearest > F0 and not farthest_ray > nearest:
+                    blocked = True
+                    break
+            if s_exit > s:
+                s = s_exit
+            if s_exit >= s_end:
+                return status, -1, -1, F0, s_end, steps
+            if sx < sy:
+                from_x = True
+                cx = edge_x if step_x > 0 else edge_x - 1
+                along = int(y + dy * s)
+                low = cy if step_y > 0 else ly << level
+                high = cy if step_y < 0 else ((ly + 1) << level) - 1
+                cy = clamp(along, low, high)
+            else:
+                from_x = False
+                cy = edge_y if step_y > 0 else edge_y - 1
+                along = int(x + dx * s)
+                low = cx if step_x > 0 else lx << level
+                high = cx if step_x < 0 else ((lx + 1) << level) - 1
+                cx = clamp(along, low, high)
+            if cx < 0 or cy < 0 or cx >= width or cy >= height:
+                return OFFSCREEN, -1, -1, F0, s, steps
+        if not blocked:
+            if level < top:
+                level += 1
+        elif level > 0:
+            level -= 1
+        else:
+            break
+    hit_x, hit_y = cx, cy
+    hit = tilted_plane_s(
+        hit_x,
+        hit_y,
+        depth,
+        ddx,
+        ddy,
+        x,
+        y,
+        z0,
+        dx,
+        dy,
+        dz,
+        inv_x,
+        inv_y,
+        step_x,
+        step_y,
+        F0,
+        s_end,
+    )
+    if hit < F0 and s > F0:
+        if from_x:
+            hit_x -= step_x
+        else:
+            hit_y -= step_y
+        if not (hit_x == own_x and hit_y == own_y):
+            hit = tilted_plane_s(
+                hit_x,
+                hit_y,
+                depth,
+                ddx,
+                ddy,
+                x,
+                y,
+                z0,
+                dx,
+                dy,
+                dz,
+                inv_x,
+                inv_y,
+                step_x,
+                step_y,
+                F0,
+                s_end,
+            )
+    if hit < F0:
+        return HIDDEN, -1, -1, F0, s, steps
+    return HIT, hit_x, hit_y, hit, min(s, hit), steps
+
+
+@parallel_kernel
+def march(
+    origin,
+    direction,
+    ray_pixel,
+    t_near,
+    t_far,
+    depth,
+    ddx,
+    ddy,
+    prim_id,
+    cells,
+    offsets,
+    widths,
+    m,
+    eye,
+    near,
+    samples,
+    max_steps,
+    status,
+    pixel,
+    prim,
+    t,
+    t_free,
+    steps,
+    steps_by_level,
+):
+    """March rays (N, 3) through a pyramid; outputs (N,), steps_by_level (STRANDS, L) int64."""
+    n = origin.shape[0]
+    height, width = depth.shape
+    chunks = (n + CHUNK - 1) // CHUNK
+    for strand in prange(STRANDS):
+        for chunk in range(strand, chunks, STRANDS):
+            for i in range(chunk * CHUNK, min(n, (chunk + 1) * CHUNK)):
+                end, x, y, z0, dx, dy, dz, s_end, z, gz = screen_ray(
+                    np.float64(origin[i, 0]),
+                    np.float64(origin[i, 1]),
+                    np.float64(origin[i, 2]),
+                    np.float64(direction[i, 0]),
+                    np.float64(direction[i, 1]),
+                    np.float64(direction[i, 2]),
+                    np.float64(t_near[i]),
+                    np.float64(t_far[i]),
+                    m,
+                    eye,
+                    near,
+                    width,
+                    height,
+                )
+                pixel[i, 0] = -1
+                pixel[i, 1] = -1
+                prim[i] = -1
+                t[i] = np.inf
+                if s_end < 0.0:
+                    status[i] = end
+                    t_free[i] = 0.0
+                    steps[i] = 0
+                    continue
+                how, hit_x, hit_y, s_hit, s_free, count = march_ray(
+                    end,
+                    np.float32(x),
+                    np.float32(y),
+                    np.float32(z0),
+                    np.float32(dx),
+                    np.float32(dy),
+                    np.float32(dz),
+                    np.float32(s_end),
+                    ray_pixel[i, 0],
+                    ray_pixel[i, 1],
+                    depth,
+                    ddx,
+                    ddy,
+                    cells,
+                    offsets,
+                    widths,
+                    samples,
+                    max_steps,
+                    steps_by_level[strand],
+                )
+                status[i] = how
+                steps[i] = count
+                start = np.float64(t_near[i])
+                if how == MISS:
+                    t_free[i] = t_far[i]
+                else:
+                    t_free[i] = ray_t(np.float64(s_free), z, gz, start)
+                if how == HIT:
+                    pixel[i, 0] = hit_x
+                    pixel[i, 1] = hit_y
+                    prim[i] = prim_id[hit_y, hit_x]
+                    t[i] = ray_t(np.float64(s_hit), z, gz, start)

@@ -1,0 +1,73 @@
+"""Reduce a depth image to its pyramid of nearest depths."""
+
+from __future__ import annotations
+
+from numba import prange
+
+from hybrid_rt.kernels._jit import kernel, parallel_kernel
+
+BAND_LEVELS = 4
+"""Levels that one band of rows makes on its own: 16 rows of 1920 pixels fit the L2 cache."""
+
+
+@kernel
+def reduce_rows(data, source, width, height, target, first, last):
+    """Make rows first..last-1 of a level at `target` from the level (height, width) at `source`.
+
+    Both are offsets into data (cells,) float32. A child beyond the last row or column stands for
+    the last one.
+    """
+    half = width >> 1
+    wide = (width + 1) >> 1
+    for y in range(first, last):
+        upper = data[source + 2 * y * width : source + (2 * y + 1) * width]
+        below = min(2 * y + 1, height - 1)
+        lower = data[source + below * width : source + (below + 1) * width]
+        cells = data[target + y * wide : target + (y + 1) * wide]
+        for x in range(half):
+            left = max(upper[2 * x], lower[2 * x])
+            right = max(upper[2 * x + 1], lower[2 * x + 1])
+            cells[x] = max(left, right)
+        if wide > half:
+            cells[half] = max(upper[width - 1], lower[width - 1])
+
+
+@parallel_kernel
+def build(depth, offsets, widths, heights, data):
+    """Fill data (cells,) float32 with all levels of depth (H, W) float32; level 0 is a copy.
+
+    offsets, widths, heights (L,) int64. Each band of rows goes up as far as it stays whole while it
+    is in the cache; what is left above is small and is done at the end.
+    """
+    levels = len(offsets)
+    low = min(BAND_LEVELS, levels - 1)
+    rows = 1 << low
+    height, width = depth.shape
+    for band in prange(heights[low]):
+        begin = band * rows
+        end = min(begin + rows, height)
+        for y in range(begin, end):
+            row = data[y * width : (y + 1) * width]
+            row[:] = depth[y]
+        for level in range(1, low + 1):
+            first = begin >> level
+            last = min((band + 1) * (rows >> level), heights[level])
+            reduce_rows(
+                data,
+                offsets[level - 1],
+                widths[level - 1],
+                heights[level - 1],
+                offsets[level],
+                first,
+                last,
+            )
+    for level in range(low + 1, levels):
+        reduce_rows(
+            data,
+            offsets[level - 1],
+            widths[level - 1],
+            heights[level - 1],
+            offsets[level],
+            0,
+            heights[level],
+        )

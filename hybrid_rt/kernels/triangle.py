@@ -1,0 +1,92 @@
+"""Ray against triangle in float64.
+
+Woop, Benthin, Wald 2013, "Watertight Ray/Triangle Intersection": the vertices are moved so that
+the ray starts at 0 and sheared so that it runs along +z; what remains is whether the point (0, 0)
+lies in a triangle of the plane. An edge's function is the same number up to its sign from both
+triangles that share it, and 0 counts as inside, so no ray passes between two triangles and an edge
+belongs to both.
+
+Error: rays and vertices are float32, taken as exact. With e = 2**-53 and r the largest coordinate
+of a vertex relative to the origin, the difference, the shear's quotient, its product and its
+difference err by no more than e r each, so a sheared vertex lies within 4 e r of its true place in
+x and in y. The edge functions of those vertices err by 2 e times their two products, which a
+further shift of a vertex by 2 e r explains. So the answer is that of a triangle whose vertices were
+moved by at most 6 e r across the ray, and t errs by no more than about
+6 e r / (|direction| * tangent of the angle between ray and plane) + 4 e t: 2**-29 of what a tracer
+in float32 errs by.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid_rt.kernels._jit import inlined
+
+
+@inlined
+def frame(d):
+    """Return (kx, ky, kz, sx, sy, sz): axes and shear for a direction (3,) that is not zero."""
+    x, y, z = abs(d[0]), abs(d[1]), abs(d[2])
+    kz = 0
+    if y > x:
+        kz = 1
+    if z > max(x, y):
+        kz = 2
+    kx = (kz + 1) % 3
+    ky = (kz + 2) % 3
+    dz = np.float64(d[kz])
+    return kx, ky, kz, np.float64(d[kx]) / dz, np.float64(d[ky]) / dz, 1.0 / dz
+
+
+@inlined
+def sheared(p, o, ray):
+    """Return a vertex in the ray's frame: (x, y) across it, and t along it."""
+    kx, ky, kz, sx, sy, sz = ray
+    z = np.float64(p[kz]) - np.float64(o[kz])
+    x = np.float64(p[kx]) - np.float64(o[kx]) - sx * z
+    y = np.float64(p[ky]) - np.float64(o[ky]) - sy * z
+    return x, y, sz * z
+
+
+@inlined
+def normal(a, b, c):
+    """Return ``cross(b - a, c - a)`` in float64; exactly zero for a triangle without area."""
+    ux, uy, uz = np.float64(b[0]) - a[0], np.float64(b[1]) - a[1], np.float64(b[2]) - a[2]
+    vx, vy, vz = np.float64(c[0]) - a[0], np.float64(c[1]) - a[1], np.float64(c[2]) - a[2]
+    return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+
+
+@inlined
+def has_area(a, b, c):
+    """Whether the triangle has an area: one without is never hit."""
+    x, y, z = normal(a, b, c)
+    return x != 0.0 or y != 0.0 or z != 0.0
+
+
+@inlined
+def inside(ax, ay, bx, by, cx, cy):
+    """Return (hit, u, v) of the point (0, 0) in a triangle of the plane; its edges belong to it."""
+    wa = cx * by - cy * bx
+    wb = ax * cy - ay * cx
+    wc = bx * ay - by * ax
+    if (wa < 0 or wb < 0 or wc < 0) and (wa > 0 or wb > 0 or wc > 0):
+        return False, 0.0, 0.0
+    det = wa + wb + wc
+    if det == 0.0:  # edge-on
+        return False, 0.0, 0.0
+    return True, wb / det, wc / det
+
+
+@inlined
+def intersect(o, ray, a, b, c):
+    """Return (t, u, v) where a ray with `frame` `ray` meets a triangle; t is NaN where it does not.
+
+    t may be negative: its range is the caller's to check.
+    """
+    ax, ay, az = sheared(a, o, ray)
+    bx, by, bz = sheared(b, o, ray)
+    cx, cy, cz = sheared(c, o, ray)
+    hit, u, v = inside(ax, ay, bx, by, cx, cy)
+    if not hit or not has_area(a, b, c):
+        return np.nan, 0.0, 0.0
+    return (1.0 - u - v) * az + u * bz + v * cz, u, v

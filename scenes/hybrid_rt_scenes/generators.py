@@ -1,0 +1,14 @@
+"""The table of generators that a scene definition may name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import hybrid_rt as hrt
+from hybrid_rt_scenes.simple import cornell, sphere, stage
+
+GENERATORS: dict[str, Callable[..., hrt.Mesh]] = {
+    "cornell": cornell,
+    "sphere": sphere,
+    "stage": stage,
+}

@@ -1,0 +1,137 @@
+"""Find scenes by name or by path."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ValidationError
+
+import hybrid_rt as hrt
+from hybrid_rt_scenes.spec import CameraSpec, MeshSpec, SceneSpec
+
+DEFINITIONS = Path(__file__).parent / "definitions"
+
+
+def scene_names() -> list[str]:
+    """Return the names of all defined scenes, sorted, whether their data is there or not."""
+    return sorted(path.stem for path in DEFINITIONS.glob("*.toml"))
+
+
+def get_scene(name: str) -> SceneSpec:
+    """Return the definition of scene `name`; nothing is loaded yet.
+
+    Raises
+    ------
+    UnknownNameError
+        No such scene; the message suggests the nearest name.
+    """
+    names = scene_names()
+    if name not in names:
+        raise hrt.UnknownNameError("scene", name, names)
+    return read_definition(DEFINITIONS / f"{name}.toml")
+
+
+def read_definition(path: Path) -> SceneSpec:
+    """Return the scene that a TOML file defines; it is named after the file.
+
+    Raises
+    ------
+    UnknownNameError
+        A key, generator or generator's parameter that does not exist, with a suggestion.
+    ArgumentError
+        Not TOML, a key that is missing, or a value of the wrong kind or out of range.
+    """
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise hrt.ArgumentError(path.name, "a TOML file", str(error)) from error
+    if "name" in table:
+        raise hrt.UnknownNameError(f"key of {path.name}", "name", set(_keys(SceneSpec)) - {"name"})
+    try:
+        return SceneSpec.model_validate({**table, "name": path.stem})
+    except hrt.UnknownNameError as error:
+        kind = f"{error.kind} in {path.name}"
+        raise hrt.UnknownNameError(kind, error.name, error.known) from None
+    except ValidationError as error:
+        raise _explain(path.name, error) from None
+
+
+def _explain(file: str, error: ValidationError) -> hrt.HybridRTError:
+    """Return the first of pydantic's complaints as one of ours."""
+    first = error.errors()[0]
+    where = first["loc"]
+    if first["type"] == "extra_forbidden":
+        models: dict[Any, type[BaseModel]] = {"mesh": MeshSpec, "cameras": CameraSpec}
+        model = models.get(where[0], SceneSpec) if len(where) > 1 else SceneSpec
+        known = set(_keys(model)) - {"name"}
+        prefix = ".".join(str(part) for part in where[:-1])
+        kind = f"key of {file}" + (f" [{prefix}]" if prefix else "")
+        return hrt.UnknownNameError(kind, str(where[-1]), known)
+    place = ".".join(str(part) for part in where)
+    got = repr(first["input"])
+    got = got if len(got) <= 80 else got[:77] + "..."
+    return hrt.ArgumentError(f"{file}: {place}" if place else file, first["msg"], got)
+
+
+def _keys(model: type[BaseModel]) -> list[str]:
+    return list(model.model_fields)
+
+
+def scene_from_path(path: str | Path) -> SceneSpec:
+    """Return a scene made of one mesh file, with cameras placed by its bounds.
+
+    Parameters
+    ----------
+    path : str or Path
+        Any file that `hybrid_rt.read_mesh` reads. It is read at once, since the cameras depend on
+        it, and `load` of the result returns what was read.
+
+    Raises
+    ------
+    MeshFileError
+        The file cannot be read.
+    """
+    path = Path(path)
+    scene = hrt.load_scene(path)
+    spec = SceneSpec(
+        name=path.stem,
+        title=path.name,
+        description=(
+            f"{len(scene)} triangles of {path.name}. Its cameras were placed automatically, "
+            "from the bounds alone: four look at it from outside, two stand at its centre."
+        ),
+        needs="It was named by its path.",
+        mesh=(MeshSpec(file=str(path.resolve())),),
+        cameras=automatic_cameras(scene),
+    )
+    spec._loaded = scene
+    return spec
+
+
+def automatic_cameras(scene: hrt.Scene) -> dict[str, CameraSpec]:
+    """Return six views of a scene chosen from its bounds alone, +Y up.
+
+    Four stand outside at 1.1 times the diagonal (60 degrees then hold the bounding sphere), two at
+    the centre and look along the horizontal axes.
+    """
+    low, high = scene.bounds
+    centre = (low + high) / 2
+    diagonal = float(np.linalg.norm(high - low))
+    if diagonal == 0.0:
+        raise hrt.ArgumentError("scene", "triangles that span some space", "a single point")
+
+    def view(eye: Any, target: Any) -> CameraSpec:
+        return CameraSpec(eye=tuple(eye), target=tuple(target), near=1e-4 * diagonal)
+
+    outside = {"front": (0.0, 0.25, 1.0), "side": (1.0, 0.25, 0.0), "corner": (1.0, 0.6, 1.0)}
+    outside["above"] = (0.2, 1.0, 0.3)
+    views = {}
+    for name, towards in outside.items():
+        direction = np.array(towards) / np.linalg.norm(towards)
+        views[name] = view(centre + 1.1 * diagonal * direction, centre)
+    for name, axis in (("inside_x", (1, 0, 0)), ("inside_z", (0, 0, 1))):
+        views[name] = view(centre, centre + diagonal * np.array(axis))
+    return views

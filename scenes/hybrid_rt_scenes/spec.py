@@ -1,0 +1,222 @@
+"""What a scene definition may say, and how it becomes triangles and cameras."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
+
+import hybrid_rt as hrt
+from hybrid_rt_scenes.generators import GENERATORS
+
+DATA_VARIABLE = "HYBRID_RT_DATA"
+
+Vector = tuple[float, float, float]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class MissingDataError(hrt.HybridRTError):
+    """A scene needs a mesh file that is not in the data directory."""
+
+
+def data_directory() -> Path:
+    """Return the folder in which mesh files of real scenes are looked for.
+
+    It is the one named by the environment variable ``HYBRID_RT_DATA``, else ``../shared/scenes``
+    beside the checkout that holds this package, else the same beside the current directory.
+    """
+    named = os.environ.get(DATA_VARIABLE)
+    if named:
+        return Path(named)
+    checkout = Path(__file__).resolve().parents[2]
+    root = checkout if (checkout / "pyproject.toml").is_file() else Path.cwd()
+    return root.parent / "shared" / "scenes"
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class CameraSpec(_Strict):
+    """A view without a number of pixels.
+
+    Attributes
+    ----------
+    eye, target, up : three float, world
+    vfov_deg : float
+        Vertical field of view in degrees.
+    near : float
+        Distance of the near plane, world units.
+    """
+
+    eye: Vector
+    target: Vector
+    up: Vector = (0.0, 1.0, 0.0)
+    vfov_deg: Annotated[float, Field(gt=0, lt=180)] = 60.0
+    near: Positive = 0.05
+
+    def sized(self, width: int, height: int) -> hrt.Camera:
+        """Return the view as a camera of `width` by `height` pixels."""
+        return hrt.Camera.look_at(
+            self.eye,
+            self.target,
+            self.up,
+            vfov_deg=self.vfov_deg,
+            width=width,
+            height=height,
+            near=self.near,
+        )
+
+
+class MeshSpec(_Strict):
+    """Where triangles come from: a file of the data directory, or a generator.
+
+    Attributes
+    ----------
+    file : str, optional
+    generator : str, optional
+        A name in `hybrid_rt_scenes.generators.GENERATORS`.
+    parameters : dict
+        Keyword arguments of the generator.
+    """
+
+    file: str | None = None
+    generator: str | None = None
+    parameters: dict[str, int | float] = {}
+
+    @model_validator(mode="after")
+    def _one_source(self) -> MeshSpec:
+        if (self.file is None) == (self.generator is None):
+            raise ValueError("name either a file or a generator")
+        if self.generator is not None:
+            if self.generator not in GENERATORS:
+                raise hrt.UnknownNameError("generator", self.generator, GENERATORS)
+            for key in self.parameters:
+                if key not in self._accepted():
+                    kind = f"parameter of generator {self.generator!r}"
+                    raise hrt.UnknownNameError(kind, key, self._accepted())
+        elif self.parameters:
+            raise ValueError("a file takes no parameters")
+        return self
+
+    def _accepted(self) -> list[str]:
+        if self.generator is None:
+            return []
+        return list(inspect.signature(GENERATORS[self.generator]).parameters)
+
+    @property
+    def resizable(self) -> bool:
+        """Whether the number of triangles can be chosen."""
+        return "size" in self._accepted()
+
+    def read(self, data_dir: Path, size: int | None) -> hrt.Mesh:
+        """Return the triangles; `size` overrides the generator's own if it has one."""
+        if self.generator is None:
+            return hrt.read_mesh(data_dir / str(self.file))
+        parameters: dict[str, Any] = dict(self.parameters)
+        if size is not None and self.resizable:
+            parameters["size"] = size
+        return GENERATORS[self.generator](**parameters)
+
+
+class SceneSpec(_Strict):
+    """A scene by name: where its triangles come from, and the views worth measuring.
+
+    Attributes
+    ----------
+    name, title, description : str
+    needs : str
+        What has to be supplied and where it comes from; empty for a scene generated from code.
+    mesh : tuple of MeshSpec
+        The meshes that make the scene, in the order of their `prim_id`.
+    cameras : dict of CameraSpec
+    """
+
+    name: str
+    title: str
+    description: str
+    needs: str = ""
+    mesh: Annotated[tuple[MeshSpec, ...], Field(min_length=1)]
+    cameras: Annotated[dict[str, CameraSpec], Field(min_length=1)]
+    _loaded: hrt.Scene | None = PrivateAttr(default=None)
+
+    @model_validator(mode="after")
+    def _needs_fit(self) -> SceneSpec:
+        if bool(self.needs) == self.builtin:
+            raise ValueError("'needs' says where mesh files come from, and only then is wanted")
+        for camera in self.cameras.values():
+            camera.sized(16, 9)  # refuses an eye at the target and an up along the view
+        return self
+
+    @property
+    def builtin(self) -> bool:
+        """Whether the scene is generated from code and needs no file."""
+        return all(mesh.file is None for mesh in self.mesh)
+
+    @property
+    def resizable(self) -> bool:
+        """Whether `load` takes a `size`."""
+        return any(mesh.resizable for mesh in self.mesh)
+
+    def camera(self, name: str, width: int, height: int) -> hrt.Camera:
+        """Return the view `name` as a camera of `width` by `height` pixels.
+
+        Raises
+        ------
+        UnknownNameError
+            No such camera; the message suggests the nearest name.
+        """
+        if name not in self.cameras:
+            raise hrt.UnknownNameError(f"camera of scene {self.name!r}", name, self.cameras)
+        return self.cameras[name].sized(width, height)
+
+    def missing(self, data_dir: Path | None = None) -> str | None:
+        """Return a sentence about the first file that is not there, or None when all are.
+
+        Parameters
+        ----------
+        data_dir : Path, optional
+            Where to look; default `data_directory`.
+        """
+        folder = data_directory() if data_dir is None else data_dir
+        for mesh in self.mesh:
+            if mesh.file is not None and not (folder / mesh.file).is_file():
+                return (
+                    f"scene {self.name!r} needs {mesh.file}, which is not in {folder}. "
+                    f"{self.needs} Put it there, or set {DATA_VARIABLE} to the folder that has it."
+                )
+        return None
+
+    def load(self, size: int | None = None, data_dir: Path | None = None) -> hrt.Scene:
+        """Return the triangles of the scene.
+
+        Parameters
+        ----------
+        size : int, optional
+            Number of triangles wanted, for a scene with a generator that can choose; default its
+            own.
+        data_dir : Path, optional
+            Where mesh files are; default `data_directory`.
+
+        Raises
+        ------
+        MissingDataError
+            A mesh file is not there; the message is that of `missing`.
+        MeshFileError
+            A mesh file cannot be read.
+        ArgumentError
+            `size` for a scene that has only one, or out of its range.
+        """
+        if size is not None and not self.resizable:
+            raise hrt.ArgumentError("size", f"None, since scene {self.name!r} has one", repr(size))
+        if self._loaded is not None:
+            return self._loaded
+        said = self.missing(data_dir)
+        if said is not None:
+            raise MissingDataError(said)
+        folder = data_directory() if data_dir is None else data_dir
+        meshes = [mesh.read(folder, size) for mesh in self.mesh]
+        return hrt.Scene.from_meshes(meshes, name=self.name)
