@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 import math
 import sys
-from enum import Enum
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
-import hybrid_rt as hrt
 import typer
 from rich.console import Console
 from rich.table import Table as RichTable
 
+import hybrid_rt as hrt
 from hybrid_rt_bench.results import ReportsError, RunData, load_run
 from hybrid_rt_bench.spec import Experiment, Resolution, experiment_names, load_experiment
 
@@ -45,7 +45,7 @@ Threads = Annotated[
 ]
 
 
-class What(str, Enum):
+class What(StrEnum):
     """What `render` can show."""
 
     shaded = "shaded"
@@ -89,8 +89,8 @@ def run(
     it is finished: Ctrl-C, or a cell that fails, costs only itself. The run's folder is
     `reports/<date>-<time>-<experiment>`; `hybrid-rt report` renders it again at any time.
 
-    Examples:
-
+    Examples
+    --------
     * `hybrid-rt run paper --quick` - a few minutes, nothing to download
 
     * `hybrid-rt run paper` - the whole experiment, on real scenes where they are found
@@ -183,7 +183,6 @@ def compare(
 def list_() -> None:
     """List scenes with their cameras, experiments and techniques."""
     import hybrid_rt_scenes as hrs
-
     from hybrid_rt_bench.techniques import TECHNIQUES
 
     table = RichTable("scene", "cameras", "what it is", title="Scenes", title_justify="left")
@@ -219,7 +218,7 @@ def info() -> None:
     from hybrid_rt_bench import env
 
     load = env.load_average()
-    triangle = hrt.Scene.from_arrays(np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), [[0, 1, 2]])
+    triangle = hrt.Scene.from_arrays(np.eye(3), [[0, 1, 2]])
     hrt.rasterize(triangle, hrt.Camera.look_at((0, 0, 2), (0, 0, 0), width=8, height=8))
     found = {**env.describe(numba.get_num_threads()), "load_average": load}
     table = RichTable(show_header=False, box=None)
@@ -260,8 +259,8 @@ def render(
 
     * `all` - a contact sheet of the four
 
-    Examples:
-
+    Examples
+    --------
     * `hybrid-rt render atrium -o atrium.png`
 
     * `hybrid-rt render sponza --camera nave --what all --size 1920x1080 -o sponza.png`

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from hybrid_rt.errors import ArgumentError
 
+from hybrid_rt.errors import ArgumentError
 from hybrid_rt_bench import stats
 from hybrid_rt_bench.report.table import Table, interval, number
 from hybrid_rt_bench.results import HYBRID_STAGES, STAGES, RunData
@@ -122,8 +122,9 @@ def _times(run: RunData) -> dict[tuple[object, ...], dict[str, np.ndarray]]:
 
 
 def _mean(values: list[tuple[float, float, float]]) -> stats.Estimate:
-    """Return the geometric mean of ratios whose errors are independent: in logarithms, the widths
-    of the cells' intervals add as squares.
+    """Return the geometric mean of ratios with independent errors.
+
+    In logarithms the widths of the cells' intervals then add as squares.
     """
     logs = np.log(np.array(values))
     centre = logs[:, 0].mean()

@@ -9,9 +9,10 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-import hybrid_rt as hrt
 import numba
 import psutil
+
+import hybrid_rt as hrt
 
 PACKAGES = ("numba", "llvmlite", "numpy", "scipy", "pandas", "pyarrow", "trimesh", "embreex")
 BUSY = 0.25
@@ -78,10 +79,15 @@ def usable_cores() -> int:
     return os.cpu_count() or 1
 
 
+def most_threads() -> int:
+    """Return how many threads Numba was started with: the most that can be asked for."""
+    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+
+
 def threading_layer() -> str:
     """Return Numba's threading layer, once a parallel kernel has run."""
     try:
-        return str(numba.threading_layer())
+        return str(numba.threading_layer())  # type: ignore[attr-defined]
     except ValueError:
         return "not started"
 

@@ -14,9 +14,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import hybrid_rt as hrt
 import numpy as np
 
+import hybrid_rt as hrt
 from hybrid_rt_bench import quality, shade, strongest, summary
 from hybrid_rt_bench.primary import primary_rays
 from hybrid_rt_bench.spec import Experiment, Resolution
@@ -118,8 +118,8 @@ def measure_cell(
     rows: list[dict[str, Any]] = []
     for number in range(-experiment.warmup, experiment.rounds):
         phase = "warmup" if number < 0 else "measured"
-        for (technique, stage), seconds in stages.run(trace_first=number % 2 == 0).items():
-            row = {"technique": technique, "stage": stage, "round": number, "seconds": seconds}
+        for (owner, stage), seconds in stages.run(trace_first=number % 2 == 0).items():
+            row = {"technique": owner, "stage": stage, "round": number, "seconds": seconds}
             rows.append({**row, "phase": phase})
         on_round()
     keep_picture = (camera.width, camera.height) == (

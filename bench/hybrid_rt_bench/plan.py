@@ -8,7 +8,6 @@ from pathlib import Path
 
 import hybrid_rt as hrt
 import hybrid_rt_scenes as hrs
-
 from hybrid_rt_bench.spec import Experiment, SceneEntry
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import hybrid_rt as hrt
 import numpy as np
 from numpy.typing import NDArray
+
+import hybrid_rt as hrt
 
 TILE = 32
 

@@ -1,19 +1,17 @@
-"""What the answers are worth: alpha, verdicts and errors of one cell, and the pixels of its figure."""
+"""What the answers of a cell are worth: alpha, verdicts, errors, and the pixels of its figure."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
-import hybrid_rt as hrt
 import numpy as np
-from hybrid_rt import metrics
 from numpy.typing import NDArray
 
+import hybrid_rt as hrt
+from hybrid_rt import metrics
 from hybrid_rt_bench import shade
 from hybrid_rt_bench.results import PIXEL_CLASSES
-
-CLAIMS = ("FALSE_HIT", "FALSE_MISS", "WRONG_PRIMITIVE", "TIE")
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,25 +49,27 @@ def judge(
         gbuffer.camera,
         pixel=result.pixel,
     )
-    n, resolved = len(rays), int(result.resolved.sum())
-    verdict = np.asarray(judged.verdict)
-    columns: dict[str, Any] = {"rays": n, "resolved": resolved}
-    alpha = metrics.Rate.of(resolved, n)
-    columns |= {"alpha": alpha.value, "alpha_low": alpha.low, "alpha_high": alpha.high}
-    for name in CLAIMS:
-        count = int(np.count_nonzero(verdict == metrics.Verdict[name]))
-        columns |= _rate(name.lower(), count, resolved)
-    wrong = np.isin(verdict, [metrics.Verdict.FALSE_HIT, metrics.Verdict.FALSE_MISS])
-    columns |= _rate("wrong", int(wrong.sum()), n)
-    columns["reference_wrong_count"] = int(
-        np.count_nonzero(verdict == metrics.Verdict.REFERENCE_WRONG)
-    )
+    rates = metrics.rates(judged)
+    wrong = np.isin(judged.verdict, [metrics.Verdict.FALSE_HIT, metrics.Verdict.FALSE_MISS])
+    n = len(rays)
+    alpha = rates["alpha"]
+    columns: dict[str, Any] = {
+        "rays": n,
+        "resolved": alpha.count,
+        "alpha": alpha.value,
+        "alpha_low": alpha.low,
+        "alpha_high": alpha.high,
+        **_rate("wrong", metrics.Rate.of(int(wrong.sum()), n)),
+    }
+    for name, rate in rates.items():
+        if name not in ("alpha", "correct"):
+            columns |= _rate(name, rate)
     for name in ("error_t", "error_px"):
-        values = np.asarray(getattr(judged, name))[result.resolved]
+        values: NDArray[np.float64] = getattr(judged, name)[result.resolved]
         values = values[np.isfinite(values)]
         p50, p99 = np.quantile(values, [0.5, 0.99]) if len(values) else (np.nan, np.nan)
         columns |= {f"{name}_p50": float(p50), f"{name}_p99": float(p99)}
-    return Quality(columns, _counts(result.status, verdict), wrong)
+    return Quality(columns, _counts(result.status, judged.verdict), wrong)
 
 
 def picture(
@@ -93,10 +93,9 @@ def picture(
     return grey, classes
 
 
-def _rate(name: str, count: int, total: int) -> dict[str, Any]:
-    rate = metrics.Rate.of(count, total)
+def _rate(name: str, rate: metrics.Rate) -> dict[str, Any]:
     return {
-        f"{name}_count": count,
+        f"{name}_count": rate.count,
         f"{name}_rate": rate.value,
         f"{name}_low": rate.low,
         f"{name}_high": rate.high,

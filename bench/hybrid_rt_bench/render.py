@@ -5,19 +5,19 @@ from __future__ import annotations
 import io
 import os
 from pathlib import Path
-from typing import Literal, cast
+from typing import Literal
 
-import hybrid_rt as hrt
 import matplotlib as mpl
 import numpy as np
-from hybrid_rt.errors import ArgumentError
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from PIL import Image
 
+import hybrid_rt as hrt
+from hybrid_rt.errors import ArgumentError
 from hybrid_rt_bench import shade
-from hybrid_rt_bench.results import write_atomic
+from hybrid_rt_bench.results import write_bytes
 
 U8 = NDArray[np.uint8]
 What = Literal["shaded", "depth", "normals", "status", "all"]
@@ -129,7 +129,7 @@ def write_png(path: Path, image: U8) -> None:
     check_output(path)
     buffer = io.BytesIO()
     Image.fromarray(image).save(buffer, "PNG")
-    write_atomic(path, lambda file: file.write(buffer.getvalue()))
+    write_bytes(path, buffer.getvalue())
 
 
 def check_output(path: Path) -> None:
@@ -163,18 +163,16 @@ def _status_patches(status: NDArray[np.uint8]) -> list[Patch]:
         count = int(np.count_nonzero(status == s))
         if count:
             share = 100 * count / len(status)
-            colour = np.array(STATUS_COLOURS[s]) / 255
+            colour = _hex(STATUS_COLOURS[s])
             label = f"{STATUS_WORDS[s]} ({share:.1f} %)"
             patches.append(Patch(facecolor=colour, edgecolor="#777777", lw=0.5, label=label))
     patches.append(
-        Patch(facecolor=np.array(BACKGROUND) / 255, edgecolor="#777777", lw=0.5, label="no surface")
+        Patch(facecolor=_hex(BACKGROUND), edgecolor="#777777", lw=0.5, label="no surface")
     )
     return patches
 
 
-def _contact_sheet(
-    scene: hrt.Scene, images: dict[str, U8], status: NDArray[np.uint8] | None
-) -> U8:
+def _contact_sheet(scene: hrt.Scene, images: dict[str, U8], status: NDArray[np.uint8] | None) -> U8:
     small = {kind: _reduced(image) for kind, image in images.items()}
     height, width = next(iter(small.values())).shape[:2]
     caption, gap, foot = 30, 10, max(60, round(width * 0.07))
@@ -207,6 +205,10 @@ def _contact_sheet(
     return _pixels(figure)
 
 
+def _hex(colour: tuple[int, int, int]) -> str:
+    return "#{:02X}{:02X}{:02X}".format(*colour)
+
+
 def _reduced(image: U8) -> U8:
     height, width = image.shape[:2]
     if width <= SHEET:
@@ -216,8 +218,6 @@ def _reduced(image: U8) -> U8:
 
 
 def _pixels(figure: Figure) -> U8:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    return cast("U8", np.asarray(canvas.buffer_rgba())[..., :3].copy())
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=100)
+    return np.asarray(Image.open(buffer).convert("RGB"))

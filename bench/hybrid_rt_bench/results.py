@@ -30,6 +30,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+
 from hybrid_rt.errors import ArgumentError, HybridRTError, UnknownNameError
 
 SCHEMA_VERSION = 1
@@ -169,12 +170,9 @@ class RunWriter:
                 frame = pd.DataFrame(rows)
                 write_atomic(self.folder / f"{name}.parquet", frame.to_parquet)
                 if name == "results":
-                    write_atomic(
-                        self.folder / "results.csv",
-                        lambda f, frame=frame: f.write(frame.to_csv(index=False).encode()),
-                    )
+                    write_bytes(self.folder / "results.csv", frame.to_csv(index=False).encode())
         text = json.dumps(self.meta, indent=1, allow_nan=False, default=_plain)
-        write_atomic(self.folder / "run.json", lambda f: f.write(text.encode()))
+        write_bytes(self.folder / "run.json", text.encode())
 
 
 def create_run(out: Path, experiment: str, meta: dict[str, Any]) -> RunWriter:
@@ -259,6 +257,11 @@ def write_atomic(path: Path, write: Callable[[Any], Any]) -> None:
             with contextlib.suppress(OSError):
                 os.unlink(temporary)
             raise
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write `content` as `write_atomic` does."""
+    write_atomic(path, lambda file: file.write(content))
 
 
 @contextlib.contextmanager

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import hybrid_rt as hrt
 import numba
 
+import hybrid_rt as hrt
 from hybrid_rt_bench import env, measure
 from hybrid_rt_bench.plan import Plan, PlannedScene, make_plan
 from hybrid_rt_bench.progress import Reporter
@@ -74,7 +74,7 @@ def run_experiment(
     ReportsError
         The folder can no longer be written to.
     """
-    most = int(numba.config.NUMBA_NUM_THREADS)
+    most = env.most_threads()
     threads = most if threads is None else threads
     if not 1 <= threads <= most:
         raise hrt.ArgumentError("threads", f"1 to {most} (the cores of this machine)", str(threads))

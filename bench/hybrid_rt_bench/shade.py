@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-import hybrid_rt as hrt
 import numpy as np
 from numpy.typing import NDArray
+
+import hybrid_rt as hrt
 
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]
 
 SUN = np.array([0.35, 0.87, 0.34], np.float32) / np.float32(np.linalg.norm([0.35, 0.87, 0.34]))
+COOL, WARM = np.array([0.96, 1.0, 1.06], np.float32), np.array([1.0, 0.95, 0.84], np.float32)
+X, Y = np.array([1, 0, 0], np.float32), np.array([0, 1, 0], np.float32)
 SKY = np.array([0.62, 0.76, 0.93], np.float32)
 """Colour of the background, brighter towards the top."""
 PATTERN = 4
@@ -55,7 +58,9 @@ def shaded(gbuffer: hrt.GBuffer, rays: hrt.Rays, tracer: hrt.EmbreeTracer, sampl
         n = normals(gbuffer)
         x, y = rays.pixel[:, 0], rays.pixel[:, 1]
         n_ray = n[y, x]
-        lit = np.maximum(n_ray @ SUN, 0) * ~_occluded(tracer, rays, np.broadcast_to(SUN, n_ray.shape))
+        lit = np.maximum(n_ray @ SUN, 0) * ~_occluded(
+            tracer, rays, np.broadcast_to(SUN, n_ray.shape)
+        )
         open_sky = _smoothed(_openness(gbuffer, rays, n_ray, tracer, samples), gbuffer, n)[y, x]
         view = rays.origin - np.asarray(gbuffer.camera.eye, np.float32)
         head = np.abs(np.einsum("ij,ij->i", n_ray, view)) / np.linalg.norm(view, axis=1)
@@ -63,8 +68,7 @@ def shaded(gbuffer: hrt.GBuffer, rays: hrt.Rays, tracer: hrt.EmbreeTracer, sampl
         ambient = (open_sky * (0.50 * hemisphere + 0.18 * head))[:, None]
         sun = (0.75 * lit)[:, None]
         tint = _tints(gbuffer.scene.object_id[gbuffer.prim_id[y, x]])
-        cool, warm = np.float32([0.96, 1.0, 1.06]), np.float32([1.0, 0.95, 0.84])
-        image[y, x] = tint * (ambient * cool + sun * warm)
+        image[y, x] = tint * (ambient * COOL + sun * WARM)
     return _srgb(image)
 
 
@@ -87,8 +91,8 @@ def _openness(
     height, width = gbuffer.prim_id.shape
     x, y = rays.pixel[:, 0], rays.pixel[:, 1]
     low, high = gbuffer.scene.bounds
-    reach = np.float32(0.08 * np.linalg.norm(high - low))
-    side = np.where(np.abs(n[:, :1]) < 0.9, np.float32([1, 0, 0]), np.float32([0, 1, 0]))
+    reach = 0.08 * float(np.linalg.norm(high - low))
+    side = np.where(np.abs(n[:, :1]) < 0.9, X, Y)
     tangent = np.cross(n, side)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     bitangent = np.cross(n, tangent)
@@ -140,9 +144,8 @@ def _smoothed(values: F32, gbuffer: hrt.GBuffer, n: F32) -> F32:
 def _facing(n: F32, towards: F32) -> F32:
     """Return `n` of unit length, on the side of `towards`."""
     length = np.linalg.norm(n, axis=1, keepdims=True)
-    n = n / np.where(length > 0, length, 1)
     sign = np.where(np.einsum("ij,ij->i", n, towards) < 0, -1, 1)
-    return np.asarray(n * sign[:, None], np.float32)
+    return np.asarray(n * (sign[:, None] / np.where(length > 0, length, 1)), np.float32)
 
 
 def _tints(object_id: NDArray[np.int32]) -> F32:

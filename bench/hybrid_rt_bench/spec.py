@@ -13,8 +13,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from hybrid_rt.errors import ArgumentError, UnknownNameError
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from hybrid_rt.errors import ArgumentError, UnknownNameError
 
 SCHEMA = 1
 

@@ -6,8 +6,9 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import hybrid_rt as hrt
 import numpy as np
+
+import hybrid_rt as hrt
 
 WIDTHS = (1, 4, 8, 16)
 BLOCKS = 8
@@ -96,9 +97,7 @@ def choose(
                 contenders[index].tracer.intersect(few)
                 best[index] = min(best[index], clock() - start)
     winner = min(best, key=best.__getitem__)
-    each = {
-        c.label: float(1e9 * best[i] / max(1, len(few))) for i, c in enumerate(contenders)
-    }
+    each = {c.label: float(1e9 * best[i] / max(1, len(few))) for i, c in enumerate(contenders)}
     return Choice(contenders[winner], each)
 
 

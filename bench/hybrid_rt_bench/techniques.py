@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from hybrid_rt.errors import UnknownNameError
 
@@ -21,7 +22,7 @@ class Technique:
 
     name: str
     description: str
-    mode: str
+    mode: Literal["paper"]
 
 
 TECHNIQUES = {

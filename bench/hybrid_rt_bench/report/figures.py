@@ -24,7 +24,7 @@ BLUE, ORANGE, GREEN, SKY, PURPLE, GREY = (
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY)
 MARKERS = ("o", "s", "^", "D", "v")
 
-STYLE = {
+STYLE: dict[Any, Any] = {
     "figure.dpi": 100,
     "savefig.dpi": 160,
     "font.size": 10,
@@ -78,16 +78,22 @@ def time_over_resolution(run: RunData) -> Figure:
             x = np.array(list(values.groups))
             ax.plot(x, values.mean(), color=colour, marker=marker, ms=5, label=label)
             if len(x) and (values.count() > 1).any():
-                ax.fill_between(
-                    x, values.min(), values.max(), color=colour, alpha=0.13, lw=0
-                )
+                ax.fill_between(x, values.min(), values.max(), color=colour, alpha=0.13, lw=0)
         sizes = part.drop_duplicates(["width", "height"])
         ticks = sizes.width * sizes.height / 1e6
-        names = dict(zip(ticks, [f"{w}×{h}" for w, h in zip(sizes.width, sizes.height, strict=True)], strict=True))
+        names = dict(
+            zip(
+                ticks,
+                [f"{w}×{h}" for w, h in zip(sizes.width, sizes.height, strict=True)],
+                strict=True,
+            )
+        )
         ax.set(title=scene, xscale="log", yscale="log", xlabel="resolution")
         ax.xaxis.set_major_locator(FixedLocator(list(names)))
         ax.xaxis.set_minor_locator(NullLocator())
-        ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _, n=names: n[min(n, key=lambda k: abs(k - x))]))
+        ax.xaxis.set_major_formatter(
+            FuncFormatter(lambda x, _, n=names: n[min(n, key=lambda k: abs(k - x))])
+        )
         ax.tick_params(axis="x", rotation=30)
         _plain_log(ax)
     axes[0].set_ylabel("time, ms")
@@ -132,7 +138,7 @@ def speedup_by_scene(run: RunData) -> Figure:
         if k:
             ax.axvline(places[0] - 0.5, color="#BBBBBB", lw=0.8)
         ax.text(
-            np.mean(places), 1.02, scene, transform=ax.get_xaxis_transform(), ha="center",
+            float(np.mean(places)), 1.02, scene, transform=ax.get_xaxis_transform(), ha="center",
             fontweight="bold",
         )  # fmt: skip
     ax.set_xticks(range(len(keys)), [key[1] for key in keys], rotation=35, ha="right")
@@ -234,7 +240,10 @@ def _first_technique(run: RunData) -> pd.DataFrame:
 def _largest(run: RunData) -> pd.DataFrame:
     rows = _first_technique(run)
     rows = rows.assign(pixels=rows.width * rows.height)
-    return rows[rows.pixels == rows.groupby(["scene", "camera"]).pixels.transform("max")]
+    largest: pd.DataFrame = rows[
+        rows.pixels == rows.groupby(["scene", "camera"]).pixels.transform("max")
+    ]
+    return largest
 
 
 def _row_of_axes(figure: Figure, count: int, *, sharey: bool) -> list[Axes]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -117,4 +116,4 @@ def _fitted(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _hex(colour: tuple[int, int, int]) -> str:
-    return mpl.colors.to_hex(np.array(colour) / 255)
+    return "#{:02X}{:02X}{:02X}".format(*colour)

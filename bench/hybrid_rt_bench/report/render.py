@@ -7,7 +7,7 @@ from pathlib import Path
 from hybrid_rt_bench.report import figures, pictures
 from hybrid_rt_bench.report.table import Table
 from hybrid_rt_bench.report.tables import all_tables
-from hybrid_rt_bench.results import ReportsError, RunData, write_atomic
+from hybrid_rt_bench.results import ReportsError, RunData, write_bytes
 
 
 def render_run(run: RunData) -> tuple[list[Table], list[Path]]:
@@ -27,7 +27,7 @@ def render_run(run: RunData) -> tuple[list[Table], list[Path]]:
     tables = all_tables(run)
     document = _document(run, tables)
     written = [run.folder / "tables.md"]
-    write_atomic(written[0], lambda file: file.write(document.encode()))
+    write_bytes(written[0], document.encode())
     folder = run.folder / "figures"
     try:
         folder.mkdir(exist_ok=True)

@@ -139,6 +139,7 @@ def table_errors(run: RunData) -> Table:
             "false miss",
             "wrong primitive",
             "tie",
+            "off by > 1 px",
             "wrong, of all rays",
             "error p50 / p99 in px",
         ],
@@ -149,14 +150,15 @@ def table_errors(run: RunData) -> Table:
             name += f", {_mode(row.technique)}"
         cells = [
             percent(row[f"{k}_rate"], row[f"{k}_low"], row[f"{k}_high"])
-            for k in ("false_hit", "false_miss", "wrong_primitive", "tie")
+            for k in ("false_hit", "false_miss", "wrong_primitive", "tie", "pixel_error")
         ]
         wrong = percent(row.wrong_rate, row.wrong_low, row.wrong_high)
         pixels = f"{number(row.error_px_p50, 2)} / {number(row.error_px_p99, 2)}"
         table.rows.append([name, f"{int(row.resolved):,}", *cells, wrong, pixels])
     table.notes.append(
-        "Share of the resolved rays, [95 % Wilson interval]; at each camera's largest resolution. "
-        "Wrong: false hits and false misses, as a share of all rays of the cell."
+        "Share of the resolved rays, [95 % Clopper-Pearson interval]; at each camera's largest "
+        "resolution. Wrong primitive: within a pixel of the truth. Off by > 1 px: whatever the "
+        "primitive. Wrong: false hits and false misses, as a share of all rays."
     )
     return table
 
