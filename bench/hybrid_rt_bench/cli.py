@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table as RichTable
 
 import hybrid_rt as hrt
+from hybrid_rt_bench.report.table import Table
 from hybrid_rt_bench.results import ReportsError, RunData, load_run
 from hybrid_rt_bench.spec import Experiment, Resolution, experiment_names, load_experiment
 
@@ -35,7 +36,7 @@ Begin with `hybrid-rt run paper --quick`, then `hybrid-rt list`.""",
     epilog="""Exit codes: 0 all well, 2 wrong usage, 3 some cells failed or nothing could be run,
 130 stopped by Ctrl-C. What was finished is always kept.""",
 )
-out = Console()
+out = Console(width=None if sys.stdout.isatty() else 160)
 err = Console(stderr=True)
 
 OutDir = Annotated[Path, typer.Option("--out", help="Directory that holds the runs.")]
@@ -175,8 +176,7 @@ def compare(
 
     a, b = load_run(first, out_dir), load_run(second, out_dir)
     for table in comparing.tables(comparing.compare(a, b), a, b):
-        out.print(table.rich())
-        out.print()
+        _show(table)
 
 
 @app.command("list")
@@ -305,11 +305,20 @@ def _render(data: RunData, *, show: bool) -> list[Path]:
         tables, written = render_run(data)
     if show:
         for table in tables:
-            out.print(table.rich())
-            out.print()
+            _show(table, written[0])
         for path in written:
             out.print(f"wrote {path}", soft_wrap=True, highlight=False)
     return written
+
+
+def _show(table: Table, document: Path | None = None) -> None:
+    """Print a table; one that is too wide for the terminal only if it stands nowhere else."""
+    rich = table.rich()
+    if document is not None and out.measure(rich).maximum > out.width:
+        out.print(f"{table.title}: too wide for this terminal, see {document}", soft_wrap=True)
+    else:
+        out.print(rich)
+    out.print()
 
 
 def _overridden(spec: Experiment, resolutions: str | None, rounds: int | None) -> Experiment:

@@ -92,11 +92,11 @@ def tables(comparison: Comparison, a: RunData, b: RunData) -> list[Table]:
         [
             [
                 f"{r.scene}, {r.camera}, {r.width}x{r.height}",
-                interval(r.ratio, r.low, r.high),
+                interval(float(r.ratio), float(r.low), float(r.high)),
                 f"{r.alpha_a:.3f}",
                 f"{r.alpha_b:.3f}",
             ]
-            for r in comparison.cells.itertuples(index=False)
+            for _, r in comparison.cells.iterrows()
         ],
         comparison.warnings,
     )

@@ -60,7 +60,6 @@ class CellRecord:
     results: list[dict[str, Any]]
     verdicts: list[dict[str, Any]]
     picture: dict[str, Any] | None
-    warnings: list[str]
 
 
 def prepare(scene: hrt.Scene, threads: int) -> LoadedScene:
@@ -131,7 +130,8 @@ def measure_cell(
         picture["shaded"] = shade.shaded(gbuffer, rays, loaded.reference)
     pyramid = hrt.build_depth_pyramid(gbuffer, threads=threads)
     reference = loaded.reference.intersect(rays)
-    results, verdicts, warnings = [], [], []
+    results, verdicts = [], []
+    unstable: dict[str, float] = {}
     for technique in techniques:
         result = hrt.trace_hybrid(
             rays, gbuffer, pyramid, stages.tracer, mode=technique.mode, threads=threads
@@ -150,17 +150,18 @@ def measure_cell(
             }
         )
         verdicts += [{"technique": technique.name, **row} for row in found.verdicts]
-        warnings += summary.unstable(name, timed)
+        unstable |= summary.unstable(timed)
         if keep_picture:
             grey, classes = quality.picture(gbuffer, rays, result, found.wrong)
             picture |= {f"grey_{technique.name}": grey, f"classes_{technique.name}": classes}
     details = {
+        "unstable": unstable,
         "rays": len(rays),
         "embree_ns_per_ray": mirror_choice.nanoseconds,
         "embree_primary_ns_per_ray": primary_choice.nanoseconds,
         "steps_by_level": [int(n) for n in marched.steps_by_level],
     }
-    return CellRecord(details, rows, results, verdicts, picture or None, _unique(warnings))
+    return CellRecord(details, rows, results, verdicts, picture or None)
 
 
 def compile_seconds(
@@ -271,10 +272,6 @@ def _by_stage(rows: list[dict[str, Any]], technique: str) -> summary.Samples:
     ]
     stages = dict.fromkeys(row["stage"] for row in mine)
     return {s: np.array([row["seconds"] for row in mine if row["stage"] == s]) for s in stages}
-
-
-def _unique(texts: list[str]) -> list[str]:
-    return list(dict.fromkeys(texts))
 
 
 def _tiny_scene() -> hrt.Scene:

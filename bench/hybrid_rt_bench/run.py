@@ -11,7 +11,7 @@ from typing import Any
 import numba
 
 import hybrid_rt as hrt
-from hybrid_rt_bench import env, measure
+from hybrid_rt_bench import env, measure, stats
 from hybrid_rt_bench.plan import Plan, PlannedScene, make_plan
 from hybrid_rt_bench.progress import Reporter
 from hybrid_rt_bench.results import ReportsError, RunWriter, create_run
@@ -104,6 +104,7 @@ def run_experiment(
         for problem in env.problems(environment):
             _warn(writer, reporter, problem)
         _measure_all(plan, experiment, techniques, threads, writer, reporter)
+        _warn_of_scatter(writer, reporter)
     except KeyboardInterrupt:
         writer.finish(interrupted=True)
         return Outcome(writer.folder, writer.measured, len(writer.failed), interrupted=True)
@@ -176,8 +177,6 @@ def _measure_one(
         reporter.advance(experiment.warmup + experiment.rounds - done)
         _fail(writer, reporter, planned.spec.name, camera, resolution, _reason(error))
         return
-    for warning in record.warnings:
-        _warn(writer, reporter, warning)
     writer.add_cell(
         {**_keys(planned.spec.name, camera, resolution), **record.details},
         record.samples,
@@ -231,6 +230,23 @@ def _keys(scene: str, camera: str, resolution: Resolution | None) -> dict[str, A
 def _warn(writer: RunWriter, reporter: Reporter, text: str) -> None:
     writer.meta["warnings"].append(text)
     reporter.say(f"warning: {text}", "yellow")
+
+
+def _warn_of_scatter(writer: RunWriter, reporter: Reporter) -> None:
+    """Say once, with advice, how many cells scattered and which one the most."""
+    cells = [cell for cell in writer.meta["cells"] if cell.get("unstable")]
+    if cells:
+        worst = max(cells, key=lambda cell: max(cell["unstable"].values()))
+        stage = max(worst["unstable"], key=worst["unstable"].__getitem__)
+        _warn(
+            writer,
+            reporter,
+            f"in {len(cells)} of {writer.measured} cells a stage's rounds scatter by more than "
+            f"{100 * stats.UNSTABLE:.0f} % (most: {worst['scene']}, {worst['camera']}, "
+            f"{worst['width']}x{worst['height']}, {stage}: the middle half spans "
+            f"{100 * worst['unstable'][stage]:.0f} % of the median); close other programs, or take "
+            "more --rounds",
+        )
 
 
 def _reason(error: BaseException) -> str:

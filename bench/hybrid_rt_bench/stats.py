@@ -133,20 +133,9 @@ def spread(samples: ArrayLike) -> float:
     return float((high - low) / mid) if mid > 0 else 0.0
 
 
-def instability(name: str, samples: ArrayLike, least_seconds: float = 1e-3) -> str | None:
-    """Return a warning with advice if the samples scatter too much to be trusted.
-
-    Stages shorter than `least_seconds` are left alone: their scatter is the clock's and the
-    scheduler's, and they weigh nothing in a sum.
-    """
-    x = _finite(samples)
-    wide = spread(x)
-    if len(x) < 3 or np.median(x) < least_seconds or wide <= UNSTABLE:
-        return None
-    return (
-        f"{name}: the middle half of {len(x)} rounds spans {100 * wide:.0f} % of the median; "
-        "close other programs, or take more --rounds"
-    )
+def unstable(samples: ArrayLike) -> bool:
+    """Tell whether samples scatter too much to be trusted; fewer than three never do."""
+    return len(np.ravel(np.asarray(samples))) >= 3 and spread(samples) > UNSTABLE
 
 
 def _finite(samples: Any) -> F64:

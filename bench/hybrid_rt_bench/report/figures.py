@@ -115,12 +115,12 @@ def speedup_by_scene(run: RunData) -> Figure:
         group["measured"].append(summary.measured_speedup(samples))
         group["pyramid"].append(summary.measured_speedup(samples, with_pyramid=True))
     keys = list(series)
-    figure = Figure(figsize=(max(5.5, 0.62 * len(keys) + 2.4), 4.0))
+    figure = Figure(figsize=(max(6.6, 0.62 * len(keys) + 2.4), 4.2))
     ax = figure.add_subplot()
     kinds = (
-        ("estimated", "estimated by the paper's formula", ORANGE, "s", -0.22),
+        ("estimated", "estimated (paper's formula)", ORANGE, "s", -0.22),
         ("measured", "measured", BLUE, "o", 0.0),
-        ("pyramid", "measured, with the pyramid", SKY, "^", 0.22),
+        ("pyramid", "measured, pyramid added", SKY, "^", 0.22),
     )
     for kind, label, colour, marker, shift in kinds:
         means = [stats.geometric_mean_of_medians(series[key][kind]) for key in keys]
@@ -143,6 +143,8 @@ def speedup_by_scene(run: RunData) -> Figure:
         )  # fmt: skip
     ax.set_xticks(range(len(keys)), [key[1] for key in keys], rotation=35, ha="right")
     ax.set_xlim(-0.6, len(keys) - 0.4)
+    low, high = ax.get_ylim()
+    ax.set_ylim(min(low, 0.9), max(high, 1.12))
     ax.set_ylabel("T(Embree) / T(hybrid)")
     ax.grid(axis="x", visible=False)
     figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=3)
@@ -199,7 +201,7 @@ def errors_by_camera(run: RunData) -> Figure:
     ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
     ax.xaxis.set_minor_locator(NullLocator())
     ax.set_yticks(range(len(rows)), [f"{r.scene}, {r.camera}" for _, r in rows.iterrows()])
-    ax.invert_yaxis()
+    ax.set_ylim(len(rows) - 0.5, -0.5)
     ax.set_xlabel("% of the rays that the screen answers")
     figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
@@ -213,7 +215,7 @@ def time_of_stages(run: RunData) -> Figure:
     parts = (
         ("march_ms", "march", GREEN),
         ("compaction_ms", "compaction", PURPLE),
-        ("fallback_ms", "fallback (Embree)", "#E69F00"),
+        ("fallback_ms", "fallback", "#E69F00"),
         ("merge_ms", "merge", SKY),
     )
     for k, (_, row) in enumerate(rows.iterrows()):
@@ -229,21 +231,23 @@ def time_of_stages(run: RunData) -> Figure:
     ax.set_xlabel("time a ray, ns (all threads together)")
     handles, labels = ax.get_legend_handles_labels()
     unique = dict(zip(labels, handles, strict=True))
-    figure.legend(unique.values(), unique.keys(), loc="outside upper center", ncols=5)
+    figure.legend(
+        unique.values(), unique.keys(), loc="outside upper center", ncols=5, fontsize=9,
+        handlelength=1.2, columnspacing=1.4,
+    )  # fmt: skip
     return figure
 
 
 def _first_technique(run: RunData) -> pd.DataFrame:
-    return run.results[run.results.technique == run.results.technique.iloc[0]]
+    first = str(run.results.technique.iloc[0])
+    return run.results[run.results.technique == first]
 
 
 def _largest(run: RunData) -> pd.DataFrame:
     rows = _first_technique(run)
     rows = rows.assign(pixels=rows.width * rows.height)
-    largest: pd.DataFrame = rows[
-        rows.pixels == rows.groupby(["scene", "camera"]).pixels.transform("max")
-    ]
-    return largest
+    best = rows.groupby(["scene", "camera"]).pixels.transform("max")
+    return rows[rows.pixels == best]
 
 
 def _row_of_axes(figure: Figure, count: int, *, sharey: bool) -> list[Axes]:

@@ -19,6 +19,7 @@ class Table:
     columns : list of str
         The first column is set left, the others right.
     rows : list of list of str
+        A row of one cell is a heading for the rows that follow.
     notes : list of str
         Sentences printed beneath.
     """
@@ -33,7 +34,10 @@ class Table:
         lines = [f"### {self.title}", ""]
         lines.append("| " + " | ".join(_escape(c) for c in self.columns) + " |")
         lines.append("|" + "|".join(["---"] + ["---:"] * (len(self.columns) - 1)) + "|")
-        lines += ["| " + " | ".join(_escape(c) for c in row) + " |" for row in self.rows]
+        for row in self.rows:
+            cells = [_escape(c) for c in row] if len(row) > 1 else [f"**{_escape(row[0])}**"]
+            cells += [""] * (len(self.columns) - len(cells))
+            lines.append("| " + " | ".join(cells) + " |")
         if self.notes:
             lines += ["", *[f"{note}  " for note in self.notes]]
         return "\n".join(lines) + "\n"
@@ -48,9 +52,10 @@ class Table:
             header_style="bold",
         )
         for number, column in enumerate(self.columns):
-            table.add_column(column, justify="right" if number else "left", overflow="fold")
+            table.add_column(column, justify="right" if number else "left")
         for row in self.rows:
-            table.add_row(*(Text(cell, style="dim") if paper(row) else Text(cell) for cell in row))
+            style = "bold" if len(row) == 1 else "italic" if paper(row) else ""
+            table.add_row(*(Text(cell, style=style) for cell in row))
         return table
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 
 from hybrid_rt_bench import stats, summary
 from hybrid_rt_bench.report import paper
-from hybrid_rt_bench.report.table import Table, interval, number, percent
+from hybrid_rt_bench.report.table import Table, interval, number
 from hybrid_rt_bench.results import STAGES, RunData
 
 Samples = dict[str, Any]
@@ -38,12 +38,15 @@ def table_1(run: RunData) -> Table:
     for technique in _techniques(run):
         rows = _of(run.results, technique=technique)
         table.rows.append(
-            [_mode(technique), *_by_resolution(rows, columns, lambda r: number(r.march_ms.mean()))]
+            [
+                f"{_mode(technique)}, all scenes",
+                *_by_resolution(rows, columns, lambda r: number(r.march_ms.mean())),
+            ]
         )
         for scene in _scenes(run):
             part = rows[rows.scene == scene]
             cells = _by_resolution(part, columns, lambda r: number(r.march_ms.mean()))
-            table.rows.append([f"  {_label(run, scene)}", *cells])
+            table.rows.append([_label(run, scene), *cells])
     table.rows.append(["paper, RTX 2080 Super", *_quote(paper.SSRM_MS, columns)])
     table.notes.append(
         f"Mean over cameras of the median of the rounds; {_threads(run)}. One mirror ray for each "
@@ -59,7 +62,7 @@ def table_2(run: RunData) -> Table:
     rows = _of(run.results, technique=_techniques(run)[0])
     for scene in _scenes(run):
         part = rows[rows.scene == scene]
-        cells = _by_resolution(part, columns, lambda r: number(r.embree_ms.mean()))
+        cells = _by_resolution(part, columns, _mean_of("embree_ms", np.mean))
         table.rows.append([_label(run, scene), *cells])
         _paper_row(table, run, scene, paper.RT_MS, columns)
     table.notes.append(
@@ -81,15 +84,13 @@ def table_3(run: RunData) -> Table:
     ]
     for technique in _techniques(run):
         for scene in _scenes(run):
-            name = _label(run, scene)
-            if len(_techniques(run)) > 1:
-                name += f", {_mode(technique)}"
+            table.rows.append([_label(run, scene, technique)])
             for label, speedup in lines:
                 cells = [
                     _speedup(run, scene, technique, resolution, speedup) for resolution in columns
                 ]
-                table.rows.append([f"{name}: {label}", *cells])
-            _paper_row(table, run, scene, paper.SPEEDUP, columns, "estimated, alpha 0.31")
+                table.rows.append([label, *cells])
+            _paper_row(table, run, scene, paper.SPEEDUP, columns, ", estimated, alpha 0.31")
     table.notes += [
         "Estimated: T_rt / (T_march + (1 - alpha) T_rt). Measured: "
         "T_rt / (T_march + T_compaction + T_fallback + T_merge), all of one round.",
@@ -105,25 +106,17 @@ def table_alpha(run: RunData) -> Table:
     table = Table("Alpha: share of rays that the screen answers", ["", *columns])
     for technique in _techniques(run):
         rows = _of(run.results, technique=technique)
+
+        def cells(part: pd.DataFrame) -> list[str]:
+            return _by_resolution(part, columns, lambda r: f"{r.alpha.mean():.3f}")
+
         for scene in _scenes(run):
             part = rows[rows.scene == scene]
+            table.rows.append([_label(run, scene, technique)])
             for camera in _ordered(part.camera):
-                one = part[part.camera == camera]
-                table.rows.append(
-                    [
-                        f"{scene}, {camera}",
-                        *_by_resolution(one, columns, lambda r: f"{r.alpha.iloc[0]:.3f}"),
-                    ]
-                )
-            table.rows.append(
-                [
-                    f"{_label(run, scene)}: mean",
-                    *_by_resolution(part, columns, lambda r: f"{r.alpha.mean():.3f}"),
-                ]
-            )
-        table.rows.append(
-            ["mean", *_by_resolution(rows, columns, lambda r: f"{r.alpha.mean():.3f}")]
-        )
+                table.rows.append([camera, *cells(part[part.camera == camera])])
+            table.rows.append([f"{scene}, mean", *cells(part)])
+        table.rows.append(["mean of all", *cells(rows)])
     table.rows.append(["paper, mean of all", *[f"{paper.ALPHA:.2f}" for _ in columns]])
     return table
 
@@ -131,60 +124,63 @@ def table_alpha(run: RunData) -> Table:
 def table_errors(run: RunData) -> Table:
     """Return what the answers get wrong, for each scene and camera."""
     table = Table(
-        "Errors of the rays that the screen answers, by a float64 judge",
+        "Errors of the rays that the screen answers, by a float64 judge, %",
         [
             "",
             "resolved rays",
             "false hit",
             "false miss",
             "wrong primitive",
-            "tie",
             "off by > 1 px",
-            "wrong, of all rays",
-            "error p50 / p99 in px",
+            "tie",
+            "wrong, of all",
+            "px p50",
+            "px p99",
         ],
     )
-    for _, row in _largest(run).iterrows():
-        name = f"{row.scene}, {row.camera}, {int(row.width)}x{int(row.height)}"
-        if len(_techniques(run)) > 1:
-            name += f", {_mode(row.technique)}"
-        cells = [
-            percent(row[f"{k}_rate"], row[f"{k}_low"], row[f"{k}_high"])
-            for k in ("false_hit", "false_miss", "wrong_primitive", "tie", "pixel_error")
-        ]
-        wrong = percent(row.wrong_rate, row.wrong_low, row.wrong_high)
-        pixels = f"{number(row.error_px_p50, 2)} / {number(row.error_px_p99, 2)}"
-        table.rows.append([name, f"{int(row.resolved):,}", *cells, wrong, pixels])
-    table.notes.append(
-        "Share of the resolved rays, [95 % Clopper-Pearson interval]; at each camera's largest "
-        "resolution. Wrong primitive: within a pixel of the truth. Off by > 1 px: whatever the "
-        "primitive. Wrong: false hits and false misses, as a share of all rays."
-    )
+    for technique in _techniques(run):
+        for scene in _scenes(run):
+            table.rows.append([_label(run, scene, technique)])
+            rows = _of(_largest(run), technique=technique)
+            for _, row in rows[rows.scene == scene].iterrows():
+                kinds = ("false_hit", "false_miss", "wrong_primitive", "pixel_error", "tie")
+                table.rows.append(
+                    [
+                        f"{row.camera}, {int(row.width)}x{int(row.height)}",
+                        f"{int(row.resolved):,}",
+                        *(_rate(row, kind) for kind in (*kinds, "wrong")),
+                        number(row.error_px_p50, 2),
+                        number(row.error_px_p99, 2),
+                    ]
+                )
+    table.notes += [
+        "Share of the resolved rays with its 95 % Clopper-Pearson interval, at each camera's "
+        "largest resolution.",
+        "False hit: more than a pixel from the truth, and another primitive. Wrong primitive: "
+        "within a pixel. Off by > 1 px: whatever the primitive.",
+        "Wrong, of all: false hits and false misses among all rays of the cell.",
+    ]
     return table
 
 
 def table_status(run: RunData) -> Table:
     """Return how the marches ended and how often each ending was wrong."""
-    table = Table(
-        "How the marches ended", ["", "share of rays", "resolved", "false hit or miss of resolved"]
-    )
-    counts = run.verdicts
+    table = Table("How the marches ended, %", ["", "of all rays", "false hit or miss, of resolved"])
     for technique in _techniques(run):
         for scene in _scenes(run):
-            part = _of(counts, technique=technique)
+            part = _of(run.verdicts, technique=technique)
             part = part[part.scene == scene]
             total = part["count"].sum()
+            table.rows.append([_label(run, scene, technique)])
             for status in _ordered(part.status):
                 rows = part[part.status == status]
-                n = rows["count"].sum()
                 resolved = rows.loc[rows.verdict != "UNRESOLVED", "count"].sum()
                 wrong = rows.loc[rows.verdict.isin(["FALSE_HIT", "FALSE_MISS"]), "count"].sum()
                 table.rows.append(
                     [
-                        f"{_label(run, scene)}: {status.lower()}",
-                        percent(n / total),
-                        f"{resolved:,}",
-                        percent(wrong / resolved) if resolved else "–",
+                        status.lower(),
+                        number(100 * rows["count"].sum() / total),
+                        number(100 * wrong / resolved) if resolved else "–",
                     ]
                 )
     return table
@@ -195,43 +191,42 @@ def table_raster(run: RunData) -> Table:
     columns = _resolutions(run)
     table = Table("Raster against Embree's primary rays; pyramid against the march", ["", *columns])
     rows = _of(run.results, technique=_techniques(run)[0])
-    lines = (
-        ("raster, ms", "raster_ms"),
-        ("Embree primary, ms", "embree_primary_ms"),
-        ("raster / Embree primary", "raster_over_embree"),
-        ("pyramid / march", "pyramid_over_march"),
+    lines: tuple[tuple[str, str, Callable[[Any], float]], ...] = (
+        ("raster, ms", "raster_ms", np.mean),
+        ("Embree primary, ms", "embree_primary_ms", np.mean),
+        ("raster / Embree primary", "raster_over_embree", stats.geometric_mean),
+        ("pyramid, ms", "pyramid_ms", np.mean),
+        ("pyramid / march", "pyramid_over_march", stats.geometric_mean),
     )
     for scene in _scenes(run):
         part = rows[rows.scene == scene]
-        for label, column in lines:
-            mean = stats.geometric_mean if "over" in column else np.mean
-            table.rows.append(
-                [
-                    f"{_label(run, scene)}: {label}",
-                    *_by_resolution(part, columns, lambda r, c=column, m=mean: number(m(r[c]))),
-                ]
-            )
+        table.rows.append([_label(run, scene)])
+        for label, column, mean in lines:
+            values = _by_resolution(part, columns, _mean_of(column, mean))
+            table.rows.append([label, *values])
     table.notes.append("Times: mean over cameras. Ratios: geometric mean of the paired ratios.")
     return table
 
 
 def table_stages(run: RunData) -> Table:
     """Return the time of every stage, for each cell."""
-    table = Table("Time of each stage, ms", ["", *STAGES.values(), "hybrid", "steps a ray"])
-    several = len(_techniques(run)) > 1
-    for _, row in run.results.iterrows():
-        name = f"{row.scene}, {row.camera}, {int(row.width)}x{int(row.height)}"
-        if several:
-            name += f", {_mode(row.technique)}"
-        times = [number(row[f"{stage}_ms"]) for stage in STAGES]
-        hybrid = interval(row.hybrid_ms, row.hybrid_ms_low, row.hybrid_ms_high)
-        table.rows.append([name, *times, hybrid, number(row.steps_per_ray)])
-    if len(run.results):
-        first = run.results.iloc[0]
-        table.notes.append(
-            f"Medians of {int(first.rounds)} rounds, stages interleaved, JIT compilation apart; "
-            f"[{100 * first.coverage_of_intervals:.0f} % order-statistic interval]."
-        )
+    short = {"embree_primary": "Embree primary", "embree": "Embree mirror", "rays": "rays"}
+    names = [short.get(stage, label) for stage, label in STAGES.items()]
+    table = Table("Time of each stage, ms", ["", *names, "hybrid", "steps a ray"])
+    for technique in _techniques(run):
+        rows = _of(run.results, technique=technique)
+        for scene in _scenes(run):
+            table.rows.append([_label(run, scene, technique)])
+            for _, row in rows[rows.scene == scene].iterrows():
+                name = f"{row.camera}, {int(row.width)}x{int(row.height)}"
+                times = [number(row[f"{stage}_ms"]) for stage in STAGES]
+                hybrid = interval(row.hybrid_ms, row.hybrid_ms_low, row.hybrid_ms_high)
+                table.rows.append([name, *times, hybrid, number(row.steps_per_ray)])
+    first = run.results.iloc[0]
+    table.notes.append(
+        f"Medians of {int(first.rounds)} rounds, stages interleaved, JIT compilation apart; "
+        f"[{100 * first.coverage_of_intervals:.0f} % order-statistic interval]."
+    )
     return table
 
 
@@ -241,17 +236,20 @@ def table_embree(run: RunData) -> Table:
         "The strongest Embree of each cell",
         ["", "mirror rays", "Mrays/s", "primary rays", "Mrays/s"],
     )
-    for _, row in _of(run.results, technique=_techniques(run)[0]).iterrows():
-        pixels = row.width * row.height
-        table.rows.append(
-            [
-                f"{row.scene}, {row.camera}, {int(row.width)}x{int(row.height)}",
-                row.embree_path,
-                number(row.rays / row.embree_ms / 1e3),
-                row.embree_primary_path,
-                number(pixels / row.embree_primary_ms / 1e3),
-            ]
-        )
+    rows = _of(run.results, technique=_techniques(run)[0])
+    for scene in _scenes(run):
+        table.rows.append([_label(run, scene)])
+        for _, row in rows[rows.scene == scene].iterrows():
+            pixels = row.width * row.height
+            table.rows.append(
+                [
+                    f"{row.camera}, {int(row.width)}x{int(row.height)}",
+                    row.embree_path,
+                    number(row.rays / row.embree_ms / 1e3),
+                    row.embree_primary_path,
+                    number(pixels / row.embree_primary_ms / 1e3),
+                ]
+            )
     return table
 
 
@@ -308,18 +306,30 @@ def _paper_row(
 ) -> None:
     row = _scene(run, scene)["row"]
     if row in values:
-        name = f"paper, {row}" + (f": {what}" if what else "")
-        table.rows.append([name, *_quote(values[row], columns)])
+        table.rows.append([f"paper, {row}{what}", *_quote(values[row], columns)])
 
 
 def _quote(values: dict[str, float], columns: list[str]) -> list[str]:
     return [f"{values[column]:g}" if column in values else "–" for column in columns]
 
 
-def _label(run: RunData, scene: str) -> str:
+def _label(run: RunData, scene: str, technique: str | None = None) -> str:
     entry = _scene(run, scene)
     stands = f", {entry['row']}-class" if entry["row"] and entry["builtin"] else ""
-    return f"{scene} ({_count(entry['triangles'])} triangles{stands})"
+    label = f"{scene} ({_count(entry['triangles'])} triangles{stands})"
+    if technique is not None and len(_techniques(run)) > 1:
+        label += f", {_mode(technique)}"
+    return label
+
+
+def _rate(row: Any, kind: str) -> str:
+    """Return a rate and its interval in per cent; a zero stays a zero."""
+    value, low, high = (100 * row[f"{kind}_{end}"] for end in ("rate", "low", "high"))
+    return f"{number(value)} [{number(low, 2)}, {number(high, 2)}]"
+
+
+def _mean_of(column: str, mean: Callable[[Any], float]) -> Callable[[pd.DataFrame], str]:
+    return lambda rows: number(float(mean(rows[column])))
 
 
 def _count(n: int) -> str:
