@@ -90,9 +90,10 @@ def march(
     t = np.empty(n, np.float32)
     t_free = np.empty(n, np.float32)
     steps = np.empty(n, np.int32)
-    steps_by_level = np.zeros((kernels.STRANDS, len(pyramid)), np.int64)
-    with _threads.limited(threads):
+    with _threads.limited(threads) as workers:
+        steps_by_level = np.zeros((workers, len(pyramid)), np.int64)
         kernels.march(
+            workers,
             rays.origin,
             rays.direction,
             rays.pixel,

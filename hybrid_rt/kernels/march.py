@@ -16,11 +16,11 @@ import numpy as np
 from numba import prange
 
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+from hybrid_rt.kernels._queue import fetch_add
 
 HIT, MISS, OFFSCREEN, HIDDEN, NEAR, EXHAUSTED, INVALID = range(7)  # types.MarchStatus
 
-CHUNK = 1024  # rays that one thread takes at a time
-STRANDS = 64  # a strand is every STRANDS-th chunk, so that a thread's share covers the whole image
+CHUNK = 1024  # rays that a thread takes at a time
 
 F0 = np.float32(0.0)
 F1 = np.float32(1.0)
@@ -90,21 +90,25 @@ def ray_t(s, z, gz, t_near):
 
 
 @inlined
-def reciprocal(delta):
-    """Return (1 / delta, step of the cell, 1 for the cell's far edge) of a screen delta."""
+def axis(delta):
+    """Return (inv, bias, step of the cell, 1 if the far edge is the larger one) of a screen delta.
+
+    ``s = (edge - start) * inv + bias``. A delta of zero, or one so small that its reciprocal
+    overflows, never reaches an edge: inv 0 and bias infinity say so without a branch and without
+    0 * infinity.
+    """
+    inv = F1 / delta
+    if math.isinf(inv):
+        return F0, INF, 0, 0
     if delta > F0:
-        return min(F1 / delta, INF), 1, 1
-    if delta < F0:
-        return F1 / delta, -1, 0
-    return INF, 0, 0
+        return inv, F0, 1, 1
+    return inv, F0, -1, 0
 
 
 @inlined
-def edge_s(edge, start, inv, step):
-    """Return the s at which the ray reaches a cell's edge; infinite for a ray that never moves."""
-    if step == 0 or math.isinf(inv):
-        return INF
-    return (np.float32(edge) - start) * inv
+def edge_s(edge, start, inv, bias):
+    """Return the s at which the ray reaches a cell's edge."""
+    return (np.float32(edge) - start) * inv + bias
 
 
 @inlined
@@ -126,10 +130,10 @@ def tilted_plane_s(
     if centre <= F0:
         return np.float32(-1.0)
     first, last = s_start, s_end
-    if step_x != 0 and not math.isinf(inv_x):
+    if step_x != 0:
         first = max(first, (np.float32(i + (step_x < 0)) - x0) * inv_x)
         last = min(last, (np.float32(i + (step_x > 0)) - x0) * inv_x)
-    if step_y != 0 and not math.isinf(inv_y):
+    if step_y != 0:
         first = max(first, (np.float32(j + (step_y < 0)) - y0) * inv_y)
         last = min(last, (np.float32(j + (step_y > 0)) - y0) * inv_y)
     a, b = ddx[j, i], ddy[j, i]
@@ -170,8 +174,8 @@ def march_ray(
     """March one ray; return (status, pixel x, pixel y, s of the hit, s proven free, steps)."""
     height, width = depth.shape
     top = offsets.shape[0] - 1
-    inv_x, step_x, far_x = reciprocal(dx)
-    inv_y, step_y, far_y = reciprocal(dy)
+    inv_x, bias_x, step_x, far_x = axis(dx)
+    inv_y, bias_y, step_y, far_y = axis(dy)
     cx = clamp(int(x), 0, width - 1)
     cy = clamp(int(y), 0, height - 1)
     s = F0
@@ -186,8 +190,8 @@ def march_ray(
         for _ in range(samples):
             lx, ly = cx >> level, cy >> level
             edge_x, edge_y = (lx + far_x) << level, (ly + far_y) << level
-            sx = edge_s(edge_x, x, inv_x, step_x)
-            sy = edge_s(edge_y, y, inv_y, step_y)
+            sx = edge_s(edge_x, x, inv_x, bias_x)
+            sy = edge_s(edge_y, y, inv_y, bias_y)
             s_exit = min(min(sx, sy), s_end)
             if skip:
                 skip = False
@@ -278,94 +282,59 @@ def march_ray(
     return HIT, hit_x, hit_y, hit, min(s, hit), steps
 
 
+@inlined
+def march_one(
+    i, origin, direction, ray_pixel, t_near, t_far, depth, ddx, ddy, prim_id,
+    cells, offsets, widths, m, eye, near, samples, max_steps,
+    status, pixel, prim, t, t_free, steps, steps_by_level,
+):  # fmt: skip
+    """Set up ray i in float64, march it in float32 and write its row of the outputs."""
+    height, width = depth.shape
+    start = np.float64(t_near[i])
+    end, x, y, z0, dx, dy, dz, s_end, z, gz = screen_ray(
+        np.float64(origin[i, 0]), np.float64(origin[i, 1]), np.float64(origin[i, 2]),
+        np.float64(direction[i, 0]), np.float64(direction[i, 1]), np.float64(direction[i, 2]),
+        start, np.float64(t_far[i]), m, eye, near, width, height,
+    )  # fmt: skip
+    how, hit_x, hit_y, s_hit, s_free, count = end, -1, -1, F0, F0, 0
+    if s_end >= 0.0:
+        how, hit_x, hit_y, s_hit, s_free, count = march_ray(
+            end, np.float32(x), np.float32(y), np.float32(z0),
+            np.float32(dx), np.float32(dy), np.float32(dz), np.float32(s_end),
+            ray_pixel[i, 0], ray_pixel[i, 1], depth, ddx, ddy,
+            cells, offsets, widths, samples, max_steps, steps_by_level,
+        )  # fmt: skip
+    status[i] = how
+    pixel[i, 0] = hit_x
+    pixel[i, 1] = hit_y
+    steps[i] = count
+    t_free[i] = t_far[i] if how == MISS else ray_t(np.float64(s_free), z, gz, start)
+    if s_end < 0.0:
+        t_free[i] = 0.0
+    if how == HIT:
+        prim[i] = prim_id[hit_y, hit_x]
+        t[i] = ray_t(np.float64(s_hit), z, gz, start)
+    else:
+        prim[i] = -1
+        t[i] = np.inf
+
+
 @parallel_kernel
 def march(
-    origin,
-    direction,
-    ray_pixel,
-    t_near,
-    t_far,
-    depth,
-    ddx,
-    ddy,
-    prim_id,
-    cells,
-    offsets,
-    widths,
-    m,
-    eye,
-    near,
-    samples,
-    max_steps,
-    status,
-    pixel,
-    prim,
-    t,
-    t_free,
-    steps,
-    steps_by_level,
-):
-    """March rays (N, 3) through a pyramid; outputs (N,), steps_by_level (STRANDS, L) int64."""
+    workers, origin, direction, ray_pixel, t_near, t_far, depth, ddx, ddy, prim_id,
+    cells, offsets, widths, m, eye, near, samples, max_steps,
+    status, pixel, prim, t, t_free, steps, steps_by_level,
+):  # fmt: skip
+    """March rays (N, 3) through a pyramid; outputs (N,), steps_by_level (workers, L) int64."""
     n = origin.shape[0]
-    height, width = depth.shape
-    chunks = (n + CHUNK - 1) // CHUNK
-    for strand in prange(STRANDS):
-        for chunk in range(strand, chunks, STRANDS):
-            for i in range(chunk * CHUNK, min(n, (chunk + 1) * CHUNK)):
-                end, x, y, z0, dx, dy, dz, s_end, z, gz = screen_ray(
-                    np.float64(origin[i, 0]),
-                    np.float64(origin[i, 1]),
-                    np.float64(origin[i, 2]),
-                    np.float64(direction[i, 0]),
-                    np.float64(direction[i, 1]),
-                    np.float64(direction[i, 2]),
-                    np.float64(t_near[i]),
-                    np.float64(t_far[i]),
-                    m,
-                    eye,
-                    near,
-                    width,
-                    height,
-                )
-                pixel[i, 0] = -1
-                pixel[i, 1] = -1
-                prim[i] = -1
-                t[i] = np.inf
-                if s_end < 0.0:
-                    status[i] = end
-                    t_free[i] = 0.0
-                    steps[i] = 0
-                    continue
-                how, hit_x, hit_y, s_hit, s_free, count = march_ray(
-                    end,
-                    np.float32(x),
-                    np.float32(y),
-                    np.float32(z0),
-                    np.float32(dx),
-                    np.float32(dy),
-                    np.float32(dz),
-                    np.float32(s_end),
-                    ray_pixel[i, 0],
-                    ray_pixel[i, 1],
-                    depth,
-                    ddx,
-                    ddy,
-                    cells,
-                    offsets,
-                    widths,
-                    samples,
-                    max_steps,
-                    steps_by_level[strand],
-                )
-                status[i] = how
-                steps[i] = count
-                start = np.float64(t_near[i])
-                if how == MISS:
-                    t_free[i] = t_far[i]
-                else:
-                    t_free[i] = ray_t(np.float64(s_free), z, gz, start)
-                if how == HIT:
-                    pixel[i, 0] = hit_x
-                    pixel[i, 1] = hit_y
-                    prim[i] = prim_id[hit_y, hit_x]
-                    t[i] = ray_t(np.float64(s_hit), z, gz, start)
+    taken = np.zeros(1, np.int64)
+    for worker in prange(workers):
+        first = fetch_add(taken.ctypes.data, CHUNK)
+        while first < n:
+            for i in range(first, min(n, first + CHUNK)):
+                march_one(
+                    i, origin, direction, ray_pixel, t_near, t_far, depth, ddx, ddy, prim_id,
+                    cells, offsets, widths, m, eye, near, samples, max_steps,
+                    status, pixel, prim, t, t_free, steps, steps_by_level[worker],
+                )  # fmt: skip
+            first = fetch_add(taken.ctypes.data, CHUNK)

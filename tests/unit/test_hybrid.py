@@ -1,0 +1,111 @@
+"""The hybrid: the march's answers, the tracer's answers for the rest, nothing lost or mixed up."""
+
+import numpy as np
+import pytest
+
+import hybrid_rt as hrt
+from hybrid_rt.kernels.hybrid import CHUNK
+
+S = hrt.MarchStatus
+
+
+def room():
+    """Return a box seen from inside with a ball of triangles in it, and a view of it."""
+    rng = np.random.default_rng(3)
+    corners = np.array([[x, y, z] for x in (-2, 2) for y in (-1, 2) for z in (-3, 3)], float)
+    quads = [(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)]
+    faces = [t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]
+    centres = rng.uniform((-1.5, -0.8, -2), (1.5, 1.5, 1), (60, 3))
+    shards = centres[:, None] + 0.25 * rng.normal(size=(60, 3, 3))
+    vertices = np.concatenate([corners, shards.reshape(-1, 3)])
+    faces = np.concatenate([np.array(faces), 8 + np.arange(180).reshape(60, 3)])
+    scene = hrt.Scene.from_arrays(vertices, faces)
+    camera = hrt.Camera.look_at((0, 0.4, 2.5), (0, 0, 0), width=160, height=120, near=0.05)
+    return scene, hrt.rasterize(scene, camera)
+
+
+@pytest.fixture(scope="module")
+def case():
+    scene, buffer = room()
+    rays = hrt.mirror_rays(buffer)
+    return scene, buffer, rays, hrt.build_depth_pyramid(buffer), hrt.EmbreeTracer(scene)
+
+
+def test_resolved_rays_from_the_march_the_others_from_the_tracer(case):
+    _scene, buffer, rays, pyramid, tracer = case
+    assert len(rays) > 3 * CHUNK  # more than one chunk is put together
+    marched = hrt.march(rays, buffer, pyramid)
+    result = hrt.trace_hybrid(rays, buffer, pyramid, tracer)
+    resolved = marched.resolved
+    assert 0.1 < resolved.mean() < 0.9
+    np.testing.assert_array_equal(result.resolved, resolved)
+    np.testing.assert_array_equal(result.status, marched.status)
+    np.testing.assert_array_equal(result.pixel, marched.pixel)
+    np.testing.assert_array_equal(result.hits.prim_id[resolved], marched.prim_id[resolved])
+    np.testing.assert_array_equal(result.hits.t[resolved], marched.t[resolved])
+    traced = tracer.intersect(rays.take(~resolved))
+    for name in ("t", "prim_id", "u", "v", "n_g"):
+        got = getattr(result.hits, name)[~resolved]
+        np.testing.assert_array_equal(got, getattr(traced, name))
+    assert set(result.timings) == {"march", "compaction", "fallback", "merge"}
+    assert all(seconds > 0 for seconds in result.timings.values())
+
+
+def test_answers_of_the_march_are_complete_hits(case):
+    scene, buffer, rays, pyramid, tracer = case
+    result = hrt.trace_hybrid(rays, buffer, pyramid, tracer)
+    hits, r = result.hits, result.resolved
+    a, b, c = (scene.vertices[scene.faces[hits.prim_id[r], k]].astype(float) for k in range(3))
+    normal = np.cross(b - a, c - a)
+    np.testing.assert_allclose(hits.n_g[r], normal, rtol=1e-5, atol=1e-6)
+    u, v = hits.u[r, None], hits.v[r, None]
+    on_triangle = (1 - u - v) * a + u * b + v * c
+    on_ray = rays.origin[r] + hits.t[r, None] * rays.direction[r]
+    np.testing.assert_allclose(on_triangle, on_ray, atol=2e-4)
+
+
+def test_most_answers_of_the_march_agree_with_the_tracer(case):
+    scene, buffer, rays, pyramid, tracer = case
+    result = hrt.trace_hybrid(rays, buffer, pyramid, tracer)
+    reference = hrt.BruteForceTracer(scene).intersect(rays)
+    same = result.hits.prim_id == reference.prim_id
+    assert same.mean() > 0.98
+    np.testing.assert_allclose(result.hits.t[same], reference.t[same], rtol=1e-3)
+
+
+def test_the_number_of_threads_changes_nothing(case):
+    _scene, buffer, rays, pyramid, tracer = case
+    one = hrt.trace_hybrid(rays, buffer, pyramid, tracer, threads=1)
+    two = hrt.trace_hybrid(rays, buffer, pyramid, tracer)
+    for name in ("t", "prim_id", "u", "v", "n_g"):
+        np.testing.assert_array_equal(getattr(one.hits, name), getattr(two.hits, name))
+
+
+def test_rays_that_all_fall_back_and_rays_that_all_resolve(case):
+    _scene, buffer, rays, pyramid, tracer = case
+    resolved = hrt.march(rays, buffer, pyramid).resolved
+    for part, share in ((rays.take(resolved), 1.0), (rays.take(~resolved), 0.0)):
+        result = hrt.trace_hybrid(part, buffer, pyramid, tracer)
+        assert result.resolved.mean() == share
+        assert len(result.hits) == len(part)
+
+
+def test_no_rays(case):
+    _scene, buffer, rays, pyramid, tracer = case
+    result = hrt.trace_hybrid(rays.take(np.zeros(0, int)), buffer, pyramid, tracer)
+    assert len(result.hits) == 0
+
+
+def test_invalid_rays_hit_nothing(case):
+    _scene, buffer, _rays, pyramid, tracer = case
+    bad = hrt.Rays.from_arrays([[0, 0, 0]] * 3, [[0, 0, 0], [np.nan, 0, 1], [0, np.inf, 0]])
+    result = hrt.trace_hybrid(bad, buffer, pyramid, tracer)
+    assert (result.status == S.INVALID).all()
+    assert (result.hits.prim_id == -1).all()
+    assert np.isinf(result.hits.t).all()
+
+
+def test_an_unknown_mode(case):
+    _scene, buffer, rays, pyramid, tracer = case
+    with pytest.raises(hrt.ArgumentError, match="mode: expected one of 'paper'"):
+        hrt.trace_hybrid(rays, buffer, pyramid, tracer, mode="psychic")
