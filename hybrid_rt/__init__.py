@@ -11,6 +11,7 @@ from hybrid_rt.errors import (
 from hybrid_rt.hybrid import trace_hybrid
 from hybrid_rt.io import read_mesh
 from hybrid_rt.march import march
+from hybrid_rt.metrics import Judged, Rate, Verdict, alpha, by_status, judge, rates
 from hybrid_rt.pyramid import build_depth_pyramid
 from hybrid_rt.raster import rasterize
 from hybrid_rt.rays import mirror_rays
@@ -42,21 +43,28 @@ __all__ = [
     "Hits",
     "HybridRTError",
     "HybridResult",
+    "Judged",
     "MarchStatus",
     "Marched",
     "Mesh",
     "MeshFileError",
+    "Rate",
     "Rays",
     "Scene",
     "UnknownNameError",
+    "Verdict",
+    "alpha",
     "build_depth_pyramid",
+    "by_status",
     "embree_info",
+    "judge",
     "load_scene",
     "march",
     "mirror_rays",
     "packet_available",
     "project",
     "rasterize",
+    "rates",
     "read_mesh",
     "trace_hybrid",
     "unproject",

@@ -90,3 +90,38 @@ def intersect(o, ray, a, b, c):
     if not hit or not has_area(a, b, c):
         return np.nan, 0.0, 0.0
     return (1.0 - u - v) * az + u * bz + v * cz, u, v
+
+
+@inlined
+def _closest_on_edge(px, py, pt, qx, qy, qt):
+    """Return (distance, t) of the point of an edge that lies closest to (0, 0)."""
+    ex, ey = qx - px, qy - py
+    length2 = ex * ex + ey * ey
+    s = 0.0
+    if length2 > 0.0:
+        s = min(max(-(px * ex + py * ey) / length2, 0.0), 1.0)
+    return np.hypot(px + s * ex, py + s * ey), pt + s * (qt - pt)
+
+
+@inlined
+def approach(o, ray, a, b, c):
+    """Return (hit, distance, t) of the point of a triangle that lies closest to a ray.
+
+    Closest as seen along the ray: `distance` is measured across the ray's main axis, at most
+    sqrt(3) of the true one. A triangle that is hit has distance 0; one that is edge-on or without
+    area is not hit, and its distance is that of its edges.
+    """
+    ax, ay, at = sheared(a, o, ray)
+    bx, by, bt = sheared(b, o, ray)
+    cx, cy, ct = sheared(c, o, ray)
+    hit, u, v = inside(ax, ay, bx, by, cx, cy)
+    if hit and has_area(a, b, c):
+        return True, 0.0, (1.0 - u - v) * at + u * bt + v * ct
+    distance, t = _closest_on_edge(ax, ay, at, bx, by, bt)
+    other, other_t = _closest_on_edge(bx, by, bt, cx, cy, ct)
+    if other < distance:
+        distance, t = other, other_t
+    other, other_t = _closest_on_edge(cx, cy, ct, ax, ay, at)
+    if other < distance:
+        distance, t = other, other_t
+    return False, distance, t
