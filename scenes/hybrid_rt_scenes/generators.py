@@ -6,9 +6,11 @@ from collections.abc import Callable
 
 import hybrid_rt as hrt
 from hybrid_rt_scenes.simple import cornell, sphere, stage
+from hybrid_rt_scenes.street import street
 
 GENERATORS: dict[str, Callable[..., hrt.Mesh]] = {
     "cornell": cornell,
     "sphere": sphere,
     "stage": stage,
+    "street": street,
 }
