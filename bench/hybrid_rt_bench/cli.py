@@ -135,14 +135,13 @@ def run(
         print(json.dumps(summary, indent=1, allow_nan=False))
     if outcome.interrupted:
         err.print(
-            f"stopped: {outcome.measured} finished cells are kept in {outcome.folder}",
+            f"stopped: {_cells(outcome.measured)} kept in {outcome.folder}",
             style="yellow", soft_wrap=True,
         )  # fmt: skip
         raise typer.Exit(INTERRUPTED)
     if outcome.failed:
         err.print(
-            f"{outcome.failed} failed, {outcome.measured} finished cells are kept in "
-            f"{outcome.folder}",
+            f"{outcome.failed} failed, {_cells(outcome.measured)} kept in {outcome.folder}",
             style="bold red", soft_wrap=True,
         )  # fmt: skip
         raise typer.Exit(FAILED)
@@ -336,6 +335,10 @@ def _overridden(spec: Experiment, resolutions: str | None, rounds: int | None) -
             order = sorted(sizes, key=lambda r: r.width * r.height)
             changes["picture"] = order[len(order) // 2]
     return spec.model_copy(update=changes)
+
+
+def _cells(count: int) -> str:
+    return f"{count} finished cell{'s' if count != 1 else ''}"
 
 
 def _names(option: str, text: str | None) -> list[str] | None:

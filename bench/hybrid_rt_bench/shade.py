@@ -65,7 +65,7 @@ def shaded(gbuffer: hrt.GBuffer, rays: hrt.Rays, tracer: hrt.EmbreeTracer, sampl
         view = rays.origin - np.asarray(gbuffer.camera.eye, np.float32)
         head = np.abs(np.einsum("ij,ij->i", n_ray, view)) / np.linalg.norm(view, axis=1)
         hemisphere = 0.75 + 0.25 * n_ray[:, 1]
-        ambient = (open_sky * (0.50 * hemisphere + 0.18 * head))[:, None]
+        ambient = (open_sky * (0.56 * hemisphere + 0.18 * head))[:, None]
         sun = (0.75 * lit)[:, None]
         tint = _tints(gbuffer.scene.object_id[gbuffer.prim_id[y, x]])
         image[y, x] = tint * (ambient * COOL + sun * WARM)
@@ -153,7 +153,7 @@ def _tints(object_id: NDArray[np.int32]) -> F32:
     hue = (object_id * 0.6180339887498949) % 1.0
     lightness = 0.80 + 0.08 * ((object_id * 0.7548776662466927) % 1.0)
     angle = 2 * np.pi * (hue[:, None] + np.array([0.0, 1 / 3, 2 / 3]))
-    return np.asarray(lightness[:, None] * (1 + 0.07 * np.cos(angle)), np.float32)
+    return np.asarray(lightness[:, None] * (1 + 0.05 * np.cos(angle)), np.float32)
 
 
 def _srgb(linear: F32) -> U8:

@@ -69,7 +69,7 @@ def _figure(run: RunData, cell: dict[str, Any], technique: str, arrays: dict[str
         _fitted(reflections(arrays[f"grey_{technique}"], arrays[f"classes_{technique}"])),
     ]
     height, width = panels[0].shape[:2]
-    gap, foot = 12, 74
+    gap, foot = 12, 62
     figure = Figure(figsize=((2 * width + gap) / 100, (height + foot) / 100), dpi=100)
     total_w, total_h = 2 * width + gap, height + foot
     for k, panel in enumerate(panels):

@@ -140,15 +140,17 @@ def table_errors(run: RunData) -> Table:
     )
     for technique in _techniques(run):
         for scene in _scenes(run):
-            table.rows.append([_label(run, scene, technique)])
+            table.rows.append([_short(run, scene, technique)])
             rows = _of(_largest(run), technique=technique)
             for _, row in rows[rows.scene == scene].iterrows():
-                kinds = ("false_hit", "false_miss", "wrong_primitive", "pixel_error", "tie")
+                kinds = ("false_hit", "false_miss", "wrong_primitive", "pixel_error")
                 table.rows.append(
                     [
                         f"{row.camera}, {int(row.width)}x{int(row.height)}",
                         f"{int(row.resolved):,}",
-                        *(_rate(row, kind) for kind in (*kinds, "wrong")),
+                        *(_rate(row, kind) for kind in kinds),
+                        number(100 * row.tie_rate),
+                        number(100 * row.wrong_rate),
                         number(row.error_px_p50, 2),
                         number(row.error_px_p99, 2),
                     ]
@@ -216,7 +218,7 @@ def table_stages(run: RunData) -> Table:
     for technique in _techniques(run):
         rows = _of(run.results, technique=technique)
         for scene in _scenes(run):
-            table.rows.append([_label(run, scene, technique)])
+            table.rows.append([_short(run, scene, technique)])
             for _, row in rows[rows.scene == scene].iterrows():
                 name = f"{row.camera}, {int(row.width)}x{int(row.height)}"
                 times = [number(row[f"{stage}_ms"]) for stage in STAGES]
@@ -238,7 +240,7 @@ def table_embree(run: RunData) -> Table:
     )
     rows = _of(run.results, technique=_techniques(run)[0])
     for scene in _scenes(run):
-        table.rows.append([_label(run, scene)])
+        table.rows.append([scene])
         for _, row in rows[rows.scene == scene].iterrows():
             pixels = row.width * row.height
             table.rows.append(
@@ -320,6 +322,10 @@ def _label(run: RunData, scene: str, technique: str | None = None) -> str:
     if technique is not None and len(_techniques(run)) > 1:
         label += f", {_mode(technique)}"
     return label
+
+
+def _short(run: RunData, scene: str, technique: str) -> str:
+    return f"{scene}, {_mode(technique)}" if len(_techniques(run)) > 1 else scene
 
 
 def _rate(row: Any, kind: str) -> str:
