@@ -1,1 +1,1 @@
-"""hybrid_rt_bench."""
+"""Measure screen-space marching in front of an exact tracer, and report what was measured."""

@@ -1,0 +1,60 @@
+"""Say on stderr how far a run is: a bar on a terminal, a line a cell elsewhere."""
+
+from __future__ import annotations
+
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+
+class Reporter:
+    """Progress of a run on a console.
+
+    Parameters
+    ----------
+    console : Console
+        Of stderr.
+    """
+
+    def __init__(self, console: Console) -> None:
+        self.console = console
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("rounds"),
+            TimeRemainingColumn(),
+            console=console,
+            transient=True,
+            disable=not console.is_terminal,
+        )
+        self._task = self._bar.add_task("starting", total=None)
+
+    def __enter__(self) -> Reporter:
+        self._bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._bar.stop()
+
+    def total(self, rounds: int) -> None:
+        """Set the length of the bar."""
+        self._bar.update(self._task, total=rounds)
+
+    def doing(self, what: str) -> None:
+        """Say what is going on."""
+        self._bar.update(self._task, description=what)
+
+    def advance(self, rounds: int = 1) -> None:
+        """Count finished rounds."""
+        self._bar.advance(self._task, rounds)
+
+    def say(self, text: str, style: str = "") -> None:
+        """Print a line that stays."""
+        self.console.print(text, style=style or None, highlight=False, markup=False, soft_wrap=True)

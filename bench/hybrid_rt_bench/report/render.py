@@ -1,0 +1,62 @@
+"""Write ``tables.md`` and ``figures/`` of a run from its files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hybrid_rt_bench.report import figures, pictures
+from hybrid_rt_bench.report.table import Table
+from hybrid_rt_bench.report.tables import all_tables
+from hybrid_rt_bench.results import ReportsError, RunData, write_bytes
+
+
+def render_run(run: RunData) -> tuple[list[Table], list[Path]]:
+    """Write the tables and figures of a run.
+
+    Returns
+    -------
+    tables : list of Table
+    paths : list of Path
+        Every file written.
+
+    Raises
+    ------
+    ReportsError
+        The run's folder cannot be written to.
+    """
+    tables = all_tables(run)
+    document = _document(run, tables)
+    written = [run.folder / "tables.md"]
+    write_bytes(written[0], document.encode())
+    folder = run.folder / "figures"
+    try:
+        folder.mkdir(exist_ok=True)
+        written += figures.plots(run, folder)
+        written += pictures.figures(run, folder)
+    except OSError as error:
+        raise ReportsError(f"{folder}: cannot be written ({error.strerror})") from error
+    return tables, written
+
+
+def _document(run: RunData, tables: list[Table]) -> str:
+    meta, machine = run.meta, run.meta["environment"]
+    cells = [cell["state"] for cell in meta["cells"]]
+    lines = [
+        f"# {meta['spec']['title']}",
+        "",
+        f"Run `{run.name}`, started {meta['started']}"
+        + ("" if meta["finished"] else ", **not finished: only some cells are here**")
+        + ".",
+        f"{machine['cpu']}, {machine['threads']} threads, {machine['os']}; Embree "
+        f"{machine['embree'].get('version', '?')}, Numba {machine['packages']['numba']}; "
+        f"commit {machine['git'] or 'unknown'}.",
+        f"Cells measured: {cells.count('measured')}, failed: {cells.count('failed')}.",
+    ]
+    for title, texts in (("Notes", meta["notes"]), ("Warnings", meta["warnings"])):
+        if texts:
+            lines += ["", f"{title}:", "", *[f"- {text}" for text in texts]]
+    failed = [cell for cell in meta["cells"] if cell["state"] == "failed"]
+    if failed:
+        lines += ["", "Failed:", ""]
+        lines += [f"- {c['scene']}, {c['camera']}: {c['error']}" for c in failed]
+    return "\n".join(lines) + "\n\n" + "\n".join(table.markdown() for table in tables)

@@ -1,0 +1,258 @@
+"""Run an experiment: every scene, camera and resolution in turn, kept as it is finished."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numba
+
+import hybrid_rt as hrt
+from hybrid_rt_bench import env, measure, stats
+from hybrid_rt_bench.plan import Plan, PlannedScene, make_plan
+from hybrid_rt_bench.progress import Reporter
+from hybrid_rt_bench.results import ReportsError, RunWriter, create_run
+from hybrid_rt_bench.spec import Experiment, Resolution
+from hybrid_rt_bench.techniques import Technique, get_technique
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a run.
+
+    Attributes
+    ----------
+    folder : Path
+    measured, failed : int
+        Cells.
+    interrupted : bool
+    """
+
+    folder: Path
+    measured: int
+    failed: int
+    interrupted: bool
+
+
+def run_experiment(
+    experiment: Experiment,
+    *,
+    reporter: Reporter,
+    scenes: Sequence[str] | None = None,
+    cameras: Sequence[str] | None = None,
+    threads: int | None = None,
+    out: Path = Path("reports"),
+    command: Sequence[str] = (),
+) -> Outcome:
+    """Measure an experiment and write its folder.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    reporter : Reporter
+    scenes, cameras : sequence of str, optional
+        See `hybrid_rt_bench.plan.make_plan`.
+    threads : int, optional
+        For every stage alike. Default: all that Numba has.
+    out : Path
+        Directory of the run's folder.
+    command : sequence of str
+        The command line, to be kept.
+
+    Returns
+    -------
+    Outcome
+        Ctrl-C is no exception: finished cells are kept, and the outcome says `interrupted`.
+
+    Raises
+    ------
+    UnknownNameError, ArgumentError, MeshFileError, NothingToRunError
+        Before anything is measured.
+    ReportsError
+        The folder can no longer be written to.
+    """
+    most = env.most_threads()
+    threads = most if threads is None else threads
+    if not 1 <= threads <= most:
+        raise hrt.ArgumentError("threads", f"1 to {most} (the cores of this machine)", str(threads))
+    techniques = [get_technique(name) for name in experiment.techniques]
+    reporter.doing("reading scenes")
+    plan = make_plan(experiment, scenes, cameras)
+    for note in plan.notes:
+        reporter.say(note, "yellow")
+    writer = create_run(
+        out,
+        experiment.name,
+        {
+            "command": list(command),
+            "spec": experiment.model_dump(mode="json", by_alias=True),
+            "notes": plan.notes,
+            "warnings": [],
+            "scenes": [],
+        },
+    )
+    numba.set_num_threads(threads)
+    try:
+        reporter.doing("compiling")
+        load = env.load_average()  # before this program adds to it
+        writer.meta["compile_seconds"] = measure.compile_seconds(experiment, techniques, threads)
+        environment = {**env.describe(threads), "load_average": load}
+        writer.meta["environment"] = environment
+        for problem in env.problems(environment):
+            _warn(writer, reporter, problem)
+        _measure_all(plan, experiment, techniques, threads, writer, reporter)
+        _warn_of_scatter(writer, reporter)
+    except KeyboardInterrupt:
+        writer.finish(interrupted=True)
+        return Outcome(writer.folder, writer.measured, len(writer.failed), interrupted=True)
+    writer.finish()
+    return Outcome(writer.folder, writer.measured, len(writer.failed), interrupted=False)
+
+
+def _measure_all(
+    plan: Plan,
+    experiment: Experiment,
+    techniques: list[Technique],
+    threads: int,
+    writer: RunWriter,
+    reporter: Reporter,
+) -> None:
+    a_cell = experiment.warmup + experiment.rounds
+    cells = sum(len(scene.cameras) for scene in plan.scenes) * len(experiment.resolutions)
+    reporter.total(cells * a_cell)
+    for path, reason in plan.unreadable:
+        _fail(writer, reporter, Path(path).stem, "", None, reason)
+    for planned in plan.scenes:
+        reporter.doing(f"loading {planned.spec.name}")
+        try:
+            loaded = _load(planned, threads, writer)
+        except (hrt.HybridRTError, MemoryError) as error:
+            _fail(writer, reporter, planned.spec.name, "", None, _reason(error))
+            reporter.advance(len(planned.cameras) * len(experiment.resolutions) * a_cell)
+            continue
+        for camera in planned.cameras:
+            for resolution in experiment.resolutions:
+                _measure_one(
+                    planned, loaded, camera, resolution, experiment, techniques, threads, writer,
+                    reporter,
+                )  # fmt: skip
+
+
+def _measure_one(
+    planned: PlannedScene,
+    loaded: measure.LoadedScene,
+    camera: str,
+    resolution: Resolution,
+    experiment: Experiment,
+    techniques: list[Technique],
+    threads: int,
+    writer: RunWriter,
+    reporter: Reporter,
+) -> None:
+    name = f"{planned.spec.name}, {camera}, {resolution}"
+    reporter.doing(name)
+    done = 0
+
+    def on_round() -> None:
+        nonlocal done
+        done += 1
+        reporter.advance()
+
+    try:
+        record = measure.measure_cell(
+            loaded,
+            planned.spec.camera(camera, resolution.width, resolution.height),
+            name,
+            experiment,
+            techniques,
+            threads,
+            on_round,
+        )
+    except ReportsError:
+        raise
+    except Exception as error:  # one bad cell must not cost the others
+        reporter.advance(experiment.warmup + experiment.rounds - done)
+        _fail(writer, reporter, planned.spec.name, camera, resolution, _reason(error))
+        return
+    writer.add_cell(
+        {**_keys(planned.spec.name, camera, resolution), **record.details},
+        record.samples,
+        record.results,
+        record.verdicts,
+        record.picture,
+    )
+    if not reporter.console.is_terminal:
+        row = record.results[0]
+        reporter.say(
+            f"{name}: alpha {row['alpha']:.3f}, Embree {row['embree_ms']:.1f} ms, "
+            f"hybrid {row['hybrid_ms']:.1f} ms, measured speed-up {row['measured']:.3f}"
+        )
+
+
+def _load(planned: PlannedScene, threads: int, writer: RunWriter) -> measure.LoadedScene:
+    scene = planned.spec.load(size=planned.size)
+    loaded = measure.prepare(scene, threads)
+    writer.meta["scenes"].append(
+        {
+            "name": planned.spec.name,
+            "title": planned.spec.title,
+            "row": planned.row,
+            "builtin": planned.spec.builtin,
+            "triangles": len(scene),
+            "zero_area": scene.zero_area,
+            "build_seconds": loaded.build_seconds,
+        }
+    )
+    return loaded
+
+
+def _fail(
+    writer: RunWriter,
+    reporter: Reporter,
+    scene: str,
+    camera: str,
+    resolution: Resolution | None,
+    reason: str,
+) -> None:
+    where = ", ".join(str(part) for part in (scene, camera, resolution) if part)
+    reporter.say(f"failed: {where}: {reason}", "bold red")
+    writer.fail_cell(_keys(scene, camera, resolution), reason)
+
+
+def _keys(scene: str, camera: str, resolution: Resolution | None) -> dict[str, Any]:
+    width, height = (resolution.width, resolution.height) if resolution else (0, 0)
+    return {"scene": scene, "camera": camera, "width": width, "height": height}
+
+
+def _warn(writer: RunWriter, reporter: Reporter, text: str) -> None:
+    writer.meta["warnings"].append(text)
+    reporter.say(f"warning: {text}", "yellow")
+
+
+def _warn_of_scatter(writer: RunWriter, reporter: Reporter) -> None:
+    """Say once, with advice, how many cells scattered and which one the most."""
+    cells = [cell for cell in writer.meta["cells"] if cell.get("unstable")]
+    if cells:
+        worst = max(cells, key=lambda cell: max(cell["unstable"].values()))
+        stage = max(worst["unstable"], key=worst["unstable"].__getitem__)
+        _warn(
+            writer,
+            reporter,
+            f"in {len(cells)} of {writer.measured} cells a stage's rounds scatter by more than "
+            f"{100 * stats.UNSTABLE:.0f} % (most: {worst['scene']}, {worst['camera']}, "
+            f"{worst['width']}x{worst['height']}, {stage}: the middle half spans "
+            f"{100 * worst['unstable'][stage]:.0f} % of the median); close other programs, or take "
+            "more --rounds",
+        )
+
+
+def _reason(error: BaseException) -> str:
+    if isinstance(error, hrt.HybridRTError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return f"not enough memory ({error})" if str(error) else "not enough memory"
+    where = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} (in {where.name}, {Path(where.filename).name})"

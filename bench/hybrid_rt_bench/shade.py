@@ -1,0 +1,162 @@
+"""Give surfaces a look: sun, sky, and how far a corner is open, for pictures of bare geometry."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+import hybrid_rt as hrt
+
+F32 = NDArray[np.float32]
+U8 = NDArray[np.uint8]
+
+SUN = np.array([0.35, 0.87, 0.34], np.float32) / np.float32(np.linalg.norm([0.35, 0.87, 0.34]))
+COOL, WARM = np.array([0.96, 1.0, 1.06], np.float32), np.array([1.0, 0.95, 0.84], np.float32)
+X, Y = np.array([1, 0, 0], np.float32), np.array([0, 1, 0], np.float32)
+SKY = np.array([0.62, 0.76, 0.93], np.float32)
+"""Colour of the background, brighter towards the top."""
+PATTERN = 4
+"""Occlusion rays differ inside squares of this many pixels, and are averaged over as many."""
+
+
+def normals(gbuffer: hrt.GBuffer) -> F32:
+    """Return the unit normal of each pixel's primitive, turned to the viewer; 0 where none.
+
+    Returns
+    -------
+    (H, W, 3) float32, world
+    """
+    covered = gbuffer.prim_id >= 0
+    out = np.zeros((*gbuffer.prim_id.shape, 3), np.float32)
+    corners = gbuffer.scene.vertices[gbuffer.scene.faces[gbuffer.prim_id[covered]]]
+    n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    towards = np.asarray(gbuffer.camera.eye, np.float32) - corners[:, 0]
+    out[covered] = _facing(n, towards)
+    return out
+
+
+def shaded(gbuffer: hrt.GBuffer, rays: hrt.Rays, tracer: hrt.EmbreeTracer, samples: int = 8) -> U8:
+    """Return the main view, lit by a sun with shadows and by an occluded sky.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+    rays : Rays
+        Its mirror rays: they start safely off every visible surface.
+    tracer : EmbreeTracer
+    samples : int
+        Occlusion rays a pixel.
+
+    Returns
+    -------
+    (H, W, 3) uint8, sRGB
+    """
+    height, width = gbuffer.prim_id.shape
+    sky = SKY * np.linspace(1.0, 0.86, height, dtype=np.float32)[:, None, None] + 0.06
+    image = np.broadcast_to(sky, (height, width, 3)).copy()
+    if len(rays):
+        n = normals(gbuffer)
+        x, y = rays.pixel[:, 0], rays.pixel[:, 1]
+        n_ray = n[y, x]
+        lit = np.maximum(n_ray @ SUN, 0) * ~_occluded(
+            tracer, rays, np.broadcast_to(SUN, n_ray.shape)
+        )
+        open_sky = _smoothed(_openness(gbuffer, rays, n_ray, tracer, samples), gbuffer, n)[y, x]
+        view = rays.origin - np.asarray(gbuffer.camera.eye, np.float32)
+        head = np.abs(np.einsum("ij,ij->i", n_ray, view)) / np.linalg.norm(view, axis=1)
+        hemisphere = 0.75 + 0.25 * n_ray[:, 1]
+        ambient = (open_sky * (0.56 * hemisphere + 0.18 * head))[:, None]
+        sun = (0.75 * lit)[:, None]
+        tint = _tints(gbuffer.scene.object_id[gbuffer.prim_id[y, x]])
+        image[y, x] = tint * (ambient * COOL + sun * WARM)
+    return _srgb(image)
+
+
+def reflected_grey(rays: hrt.Rays, hits: hrt.Hits) -> F32:
+    """Return how bright what each ray met looks, in 0 to 1, from the ray's side; 1 for a miss."""
+    grey = np.ones(len(rays), np.float32)
+    met = hits.prim_id >= 0
+    n = _facing(hits.n_g[met], -rays.direction[met])
+    length = np.linalg.norm(rays.direction[met], axis=1)
+    head = np.einsum("ij,ij->i", n, -rays.direction[met]) / np.where(length > 0, length, 1)
+    sun = np.maximum(n @ SUN, 0)
+    grey[met] = 0.16 + 0.30 * (0.5 + 0.5 * n[:, 1]) + 0.26 * head + 0.24 * sun
+    return np.clip(grey, 0, 1)
+
+
+def _openness(
+    gbuffer: hrt.GBuffer, rays: hrt.Rays, n: F32, tracer: hrt.EmbreeTracer, samples: int
+) -> F32:
+    """Return, for each pixel, the share of the hemisphere that is open within a short distance."""
+    height, width = gbuffer.prim_id.shape
+    x, y = rays.pixel[:, 0], rays.pixel[:, 1]
+    low, high = gbuffer.scene.bounds
+    reach = 0.08 * float(np.linalg.norm(high - low))
+    side = np.where(np.abs(n[:, :1]) < 0.9, X, Y)
+    tangent = np.cross(n, side)
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    bitangent = np.cross(n, tangent)
+    cell = (x % PATTERN) + PATTERN * (y % PATTERN)
+    total = np.zeros(len(rays), np.float32)
+    for sample in range(samples):
+        # An additive recurrence (the plastic number's) fills the square evenly from any start.
+        index = (cell * samples + sample + 1).astype(np.float64)
+        u, v = (index * 0.7548776662466927) % 1.0, (index * 0.5698402909980532) % 1.0
+        radius, angle = np.sqrt(u), 2 * np.pi * v
+        a, b, c = radius * np.cos(angle), radius * np.sin(angle), np.sqrt(1 - u)
+        direction = a[:, None] * tangent + b[:, None] * bitangent + c[:, None] * n
+        total += ~_occluded(tracer, rays, direction.astype(np.float32), reach)
+    out = np.zeros((height, width), np.float32)
+    out[y, x] = total / samples
+    return out
+
+
+def _occluded(
+    tracer: hrt.EmbreeTracer, rays: hrt.Rays, direction: NDArray[np.float32], reach: float = np.inf
+) -> NDArray[np.bool_]:
+    t_far = np.full(len(rays), reach, np.float32)
+    d = np.ascontiguousarray(direction, np.float32)
+    return tracer.occluded(hrt.Rays(rays.origin, d, rays.pixel, rays.t_near, t_far))
+
+
+def _smoothed(values: F32, gbuffer: hrt.GBuffer, n: F32) -> F32:
+    """Return the mean of each pixel's square, over pixels of the same surface."""
+    total, weight = np.zeros_like(values), np.zeros_like(values)
+    before = (PATTERN - 1) // 2
+    padded = [
+        np.pad(a, [(PATTERN, PATTERN)] * 2 + [(0, 0)] * (a.ndim - 2))
+        for a in (values, gbuffer.depth, n)
+    ]
+    height, width = values.shape
+    for dy in range(-before, PATTERN - before):
+        for dx in range(-before, PATTERN - before):
+            s = np.s_[PATTERN + dy : PATTERN + dy + height, PATTERN + dx : PATTERN + dx + width]
+            value, depth, normal = (a[s] for a in padded)
+            plane = gbuffer.depth + dx * gbuffer.ddx + dy * gbuffer.ddy
+            same = (np.einsum("ijk,ijk->ij", n, normal) > 0.9) & (
+                np.abs(depth - plane) <= 0.02 * gbuffer.depth
+            )
+            total += value * same
+            weight += same
+    return np.asarray(np.divide(total, weight, out=values.copy(), where=weight > 0))
+
+
+def _facing(n: F32, towards: F32) -> F32:
+    """Return `n` of unit length, on the side of `towards`."""
+    length = np.linalg.norm(n, axis=1, keepdims=True)
+    sign = np.where(np.einsum("ij,ij->i", n, towards) < 0, -1, 1)
+    return np.asarray(n * (sign[:, None] / np.where(length > 0, length, 1)), np.float32)
+
+
+def _tints(object_id: NDArray[np.int32]) -> F32:
+    """Return a quiet colour for each object, so that neighbours tell apart."""
+    hue = (object_id * 0.6180339887498949) % 1.0
+    lightness = 0.80 + 0.08 * ((object_id * 0.7548776662466927) % 1.0)
+    angle = 2 * np.pi * (hue[:, None] + np.array([0.0, 1 / 3, 2 / 3]))
+    return np.asarray(lightness[:, None] * (1 + 0.05 * np.cos(angle)), np.float32)
+
+
+def _srgb(linear: F32) -> U8:
+    x = np.clip(linear, 0, None)
+    x = x / (1 + 0.25 * x)  # rolls off what the sun overexposes
+    return np.asarray(np.round(255 * np.clip(x, 0, 1) ** (1 / 1.8)), np.uint8)

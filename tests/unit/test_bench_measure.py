@@ -1,0 +1,157 @@
+import numpy as np
+import pytest
+
+import hybrid_rt as hrt
+from hybrid_rt_bench import env, plan, primary, shade, strongest
+from hybrid_rt_bench.spec import load_experiment
+
+PAPER = load_experiment("paper")
+
+
+def quad_scene():
+    """Return a floor of two triangles at y = 0."""
+    corners = np.array([(-4, 0, -4), (4, 0, -4), (4, 0, 4), (-4, 0, 4)], np.float32)
+    return hrt.Scene.from_arrays(corners, np.array([(0, 1, 2), (0, 2, 3)], np.int32))
+
+
+@pytest.mark.parametrize(("width", "height"), [(1, 1), (7, 3), (64, 33)])
+def test_primary_rays_go_once_through_the_centre_of_every_pixel(width, height):
+    camera = hrt.Camera.look_at((1, 2, 3), (0, 0.5, -1), width=width, height=height)
+    rays = primary.primary_rays(camera)
+    at = np.array(camera.eye) + 5.0 * rays.direction
+    places = hrt.project(camera, at)
+    assert len(rays) == width * height
+    assert np.allclose(places[:, 0] % 1, 0.5, atol=1e-3)
+    assert np.allclose(places[:, 1] % 1, 0.5, atol=1e-3)
+    pixels = {(int(x), int(y)) for x, y, _ in places}
+    assert pixels == {(x, y) for x in range(width) for y in range(height)}
+
+
+def test_primary_rays_have_z_view_for_t():
+    camera = hrt.Camera.look_at((0, 2, 3), (0, 0, 0), width=32, height=24, near=0.1)
+    rays = primary.primary_rays(camera)
+    hits = hrt.EmbreeTracer(quad_scene()).intersect(rays)
+    gbuffer = hrt.rasterize(quad_scene(), camera)
+    seen = hits.prim_id >= 0
+    assert seen.sum() == (gbuffer.prim_id >= 0).sum()
+    assert np.allclose(
+        np.sort(camera.near / hits.t[seen]), np.sort(gbuffer.depth[gbuffer.depth > 0]), rtol=1e-5
+    )
+    assert (rays.t_near == np.float32(camera.near)).all()
+
+
+class SlowTracer:
+    """A tracer that takes a given time on a given clock."""
+
+    def __init__(self, seconds, clock):
+        self.seconds, self.clock = seconds, clock
+
+    def intersect(self, rays):
+        self.clock.now += self.seconds * len(rays)
+
+
+class Clock:
+    now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
+def test_strongest_is_the_fastest_whatever_the_order():
+    clock = Clock()
+    costs = {"a": 5e-9, "b": 1e-9, "c": 3e-9, "d": 4e-9, "e": 2e-9, "f": 9e-9}
+    rays = hrt.Rays.from_arrays(np.zeros((1000, 3)), np.ones((1000, 3)))
+    contenders = [strongest.Candidate(k, SlowTracer(s, clock)) for k, s in costs.items()]
+    for order in (contenders, contenders[::-1]):
+        choice = strongest.choose(order, rays, 512, clock=clock)
+        assert choice.best.label == "b"
+        assert choice.nanoseconds == pytest.approx({k: 1e9 * s for k, s in costs.items()})
+
+
+def test_candidates_are_every_path_in_both_modes():
+    robust, default = (hrt.EmbreeTracer(quad_scene(), robust=mode) for mode in (True, False))
+    found = strongest.candidates(robust, default)
+    labels = [candidate.label for candidate in found]
+    assert len(set(labels)) == len(labels) == 2 + 2 * 4 * 2
+    for candidate in found:
+        assert ("robust" in candidate.label) is candidate.tracer.robust
+        assert candidate.label.startswith(candidate.tracer.path)
+    rays = primary.primary_rays(hrt.Camera.look_at((0, 2, 3), (0, 0, 0), width=16, height=16))
+    answers = [candidate.tracer.intersect(rays).prim_id for candidate in found]
+    assert all((answer == answers[0]).all() for answer in answers)
+
+
+def test_a_missing_scene_is_stood_in_for_and_named(monkeypatch, tmp_path):
+    monkeypatch.setenv("HYBRID_RT_DATA", str(tmp_path))
+    found = plan.make_plan(PAPER)
+    stand_ins = [entry.stand_in for entry in PAPER.scenes]
+    assert [scene.spec.name for scene in found.scenes] == stand_ins
+    assert [scene.row for scene in found.scenes] == ["Sphere", "Sponza", "Bistro"]
+    assert len(found.notes) == 3
+    assert all(str(tmp_path) in note and "stands in" in note for note in found.notes)
+
+
+def test_a_scene_asked_for_by_name_has_no_stand_in(monkeypatch, tmp_path):
+    monkeypatch.setenv("HYBRID_RT_DATA", str(tmp_path))
+    found = plan.make_plan(PAPER, scenes=["sponza", "sphere"])
+    assert [scene.spec.name for scene in found.scenes] == ["sphere"]
+    assert "sponza" in found.notes[0]
+    with pytest.raises(plan.NothingToRunError, match="sponza"):
+        plan.make_plan(PAPER, scenes=["sponza"])
+
+
+def test_quick_takes_the_first_cameras_of_each_scene():
+    quick = load_experiment("paper", quick=True)
+    found = plan.make_plan(quick, scenes=["sphere"])
+    every = tuple(plan.make_plan(PAPER, scenes=["sphere"]).scenes[0].spec.cameras)
+    assert found.scenes[0].cameras == every[: quick.cameras]
+
+
+def test_cameras_are_taken_by_the_scenes_that_have_them():
+    found = plan.make_plan(PAPER, scenes=["sphere", "cornell"], cameras=["close"])
+    assert [scene.cameras for scene in found.scenes] == [("close",)]
+    assert "cornell" in found.notes[0]
+    with pytest.raises(hrt.UnknownNameError, match="did you mean 'close'"):
+        plan.make_plan(PAPER, scenes=["sphere"], cameras=["clos"])
+
+
+def test_problems_name_what_would_spoil_timings():
+    quiet = {
+        "load_average": 0.0, "logical_cores": 8, "threading_layer": "omp", "threads": 8,
+        "packet_path": "available",
+    }  # fmt: skip
+    before = env.problems(quiet)
+    for key, value, said in (
+        ("load_average", 6.0, "busy"),
+        ("threading_layer", "workqueue", "workqueue"),
+        ("packet_path", "no library", "no library"),
+        ("threads", 9, "9 threads on 8"),
+    ):
+        found = env.problems({**quiet, key: value})
+        assert len(found) == len(before) + 1
+        assert any(said in text for text in found)
+
+
+def test_normals_face_the_viewer_from_either_side():
+    for height in (2.0, -2.0):
+        camera = hrt.Camera.look_at((0, height, 3), (0, 0, 0), width=16, height=12)
+        gbuffer = hrt.rasterize(quad_scene(), camera)
+        n = shade.normals(gbuffer)
+        assert np.allclose(n[gbuffer.prim_id >= 0], (0, np.sign(height), 0))
+        assert (n[gbuffer.prim_id < 0] == 0).all()
+
+
+def test_a_surface_under_a_roof_is_darker():
+    camera = hrt.Camera.look_at((0, 1, 6), (0, 0, 0), width=40, height=30)
+    floor = quad_scene()
+    roof = hrt.Scene.from_arrays(
+        np.concatenate([floor.vertices, floor.vertices + np.float32([0, 0.6, 0])]),
+        np.concatenate([floor.faces, floor.faces + 4]),
+    )
+    brightness = []
+    for scene in (floor, roof):
+        gbuffer = hrt.rasterize(scene, camera)
+        rays = hrt.mirror_rays(gbuffer)
+        image = shade.shaded(gbuffer, rays, hrt.EmbreeTracer(scene))
+        brightness.append(image[gbuffer.prim_id[..., None].repeat(3, 2) == 0].mean())
+    assert brightness[1] < 0.8 * brightness[0]
