@@ -131,10 +131,14 @@ def test_the_fixed_scenes_have_the_triangles_that_they_say(small):
 
 
 def test_a_size_out_of_range_or_for_a_fixed_scene_is_refused():
-    with pytest.raises(hrt.ArgumentError, match=r"size: expected 1024 to 8388608 .*1023"):
+    with pytest.raises(
+        hrt.ArgumentError, match=r"size: expected an integer >= 1024 and <= 8388608.*1023"
+    ):
         get_scene("street").load(size=1023)
     with pytest.raises(hrt.ArgumentError, match=r"size: expected None.*'cornell'"):
         get_scene("cornell").load(size=5000)
+    with pytest.raises(hrt.ArgumentError, match="size: expected an integer"):
+        atrium(1e5)  # type: ignore[arg-type]
     with pytest.raises(hrt.ArgumentError, match="seed"):
         street(2**12, seed=-1)
 
