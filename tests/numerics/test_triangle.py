@@ -17,8 +17,7 @@ def length(vector):
 def meet(origin, direction, triangle):
     """(t, u, v) by the kernel from float32 arrays."""
     o, d = (np.asarray(x, np.float32) for x in (origin, direction))
-    a, b, c = np.asarray(triangle, np.float32)
-    return intersect(o, frame(d), a, b, c)
+    return intersect(o, frame(d), np.asarray(triangle, np.float32), 0, 1, 2)
 
 
 def test_random_triangles_against_exact_arithmetic():
@@ -73,7 +72,7 @@ def test_no_ray_passes_between_two_triangles_that_share_an_edge(offset):
     """Edge functions are equal and opposite in both triangles, so one of them takes the ray."""
     rng = np.random.default_rng(2)
     for _ in range(1000):
-        a, b, c, e = (rng.normal(size=(4, 3)) + offset).astype(np.float32)
+        a, b, c, e = vertices = (rng.normal(size=(4, 3)) + offset).astype(np.float32)
         o = (3 * rng.normal(size=3) + offset).astype(np.float32)
         d = (a + rng.random() * (b.astype(float) - a) - o).astype(np.float32)
         ray = frame(d)
@@ -82,7 +81,7 @@ def test_no_ray_passes_between_two_triangles_that_share_an_edge(offset):
         sides = [np.sign(cross2(flat[1] - flat[0], p - flat[0])) for p in flat[2:]]
         if sides[0] * sides[1] >= 0:
             continue
-        both = intersect(o, ray, a, b, c)[0], intersect(o, ray, b, a, e)[0]
+        both = intersect(o, ray, vertices, 0, 1, 2)[0], intersect(o, ray, vertices, 1, 0, 3)[0]
         assert not np.isnan(both).all()
 
 
@@ -126,6 +125,12 @@ def test_edge_on_rays_do_not_hit():
     assert np.isnan(meet((0, 0, -3), (1, 0, 0), triangle)[0])
 
 
+def test_a_ray_that_starts_on_an_edge_hits_at_zero():
+    """With 1 - u - v as the weight of the third corner, t rounded to -1.4e-17 and was no hit."""
+    triangle = np.array([(0, 1, 1), (0, 0, 0), (-3, 0, 0)], np.float32)
+    assert meet((-1, 0, 0), (0, 0, -4), triangle)[0] == 0
+
+
 def test_both_windings_and_every_main_axis_give_the_same_t():
     triangle = np.array([(-1, -1, -2), (1, -1, -2), (0, 1, -2)], np.float32)
     for axis in range(3):
@@ -139,19 +144,21 @@ def test_both_windings_and_every_main_axis_give_the_same_t():
 def test_length_of_the_direction_scales_t_exactly():
     triangle = [(-1, -1, -2), (1, -1, -2), (0, 1, -2)]
     t = meet((0, 0, 0), (0.1, 0.1, -1), triangle)[0]
+    assert t == pytest.approx(2)
     for exponent in (-120, -40, 40, 120):
         d = np.array((0.1, 0.1, -1), np.float32) * np.float32(2.0**exponent)
         assert meet((0, 0, 0), d, triangle)[0] == t * 2.0**-exponent
 
 
 def test_approach_measures_the_gap_to_the_nearest_edge():
-    a, b, c = np.array([(-1, -1, -4), (1, -1, -4), (1, 1, -4)], np.float32)
+    triangle = np.array([(-1, -1, -4), (1, -1, -4), (1, 1, -4)], np.float32)
     o, d = np.zeros(3, np.float32), np.array((-0.25, 0.25, -1), np.float32)
-    hit, distance, t = approach(o, frame(d), a, b, c)
+    hit, distance, t = approach(o, frame(d), triangle, 0, 1, 2)
     assert not hit
     assert distance == pytest.approx(np.sqrt(2))  # from (-1, 1) to the diagonal at (0, 0)
     assert t == 4
-    hit, distance, t = approach(o, frame(np.array((0.125, 0, -1), np.float32)), a, b, c)
+    d = np.array((0.125, 0, -1), np.float32)
+    hit, distance, t = approach(o, frame(d), triangle, 0, 1, 2)
     assert (hit, distance, t) == (True, 0, 4)
 
 

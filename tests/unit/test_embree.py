@@ -120,9 +120,7 @@ rays = hrt.Rays.from_arrays(np.zeros((20, 3)), np.tile([(0.0, 0, -1)], (20, 1)))
 tracer = hrt.EmbreeTracer(scene)
 for width in (1, 4, 8, 16):
     assert (tracer.with_path(width=width).intersect(rays).prim_id == 0).all()
-    assert tracer.with_path(width=width).occluded(rays).all()
-for kernel in (kernels.intersect, kernels.occluded):
-    print(len(kernel.signatures), sum(kernel.stats.cache_hits.values()))
+print(len(kernels.intersect.signatures), sum(kernels.intersect.stats.cache_hits.values()))
 """
 
 
@@ -139,7 +137,9 @@ def test_machine_code_is_compiled_once_and_serves_the_next_process(tmp_path):
             [sys.executable, "-c", SCRIPT],
             env=environment, capture_output=True, text=True, check=True,
         )  # fmt: skip
-        return [tuple(map(int, line.split())) for line in done.stdout.splitlines()]
+        signatures, from_cache = map(int, done.stdout.split())
+        assert signatures == 1
+        return from_cache
 
-    assert run() == [(1, 0), (1, 0)]
-    assert run() == [(1, 1), (1, 1)]
+    assert run() == 0
+    assert run() == 1
