@@ -127,14 +127,13 @@ class NativeScene:
     def __init__(self, scene: Scene, *, threads: int, robust: bool, build_quality: str) -> None:
         lib = _library()
         self._device = _new_device(lib, threads)
-        self._scene = 0
         self._finalizer = weakref.finalize(self, lib.rtcReleaseDevice, self._device)
         # Embree shares these buffers. It reads 16 bytes at every vertex of 12, hence one row more.
         self._vertices = np.zeros((len(scene.vertices) + 1, 3), np.float32)
         self._vertices[:-1] = scene.vertices
         self._faces = np.ascontiguousarray(scene.faces, np.uint32)
 
-        handle = lib.rtcNewScene(self._device)
+        self._scene = handle = lib.rtcNewScene(self._device)
         self._check("rtcNewScene")
         self._finalizer.detach()
         self._finalizer = weakref.finalize(
@@ -154,7 +153,6 @@ class NativeScene:
         lib.rtcReleaseGeometry(geometry)  # the scene keeps it
         lib.rtcCommitScene(handle)
         self._check("rtcCommitScene")
-        self._scene = handle
 
     def intersect(self, rays: Rays, *, width: int, coherent: bool, workers: int) -> Hits:
         """Return the nearest hits; `workers` is the number of Numba threads in use."""

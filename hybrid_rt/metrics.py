@@ -325,6 +325,11 @@ def rates(judged: Judged) -> dict[str, Rate]:
         "alpha" of all rays. Of the resolved rays: one for each verdict ("correct", "tie",
         "false_hit", "false_miss", "wrong_primitive", "reference_wrong"), and "pixel_error" (a hit
         is claimed, more than `pixel_tolerance` pixels from the truth, whatever its verdict).
+
+    Notes
+    -----
+    "pixel_error" is meant for answers by pixel. Those of a tracer may lie beside the camera, where
+    a pixel is so thin that rounding alone moves a hit by more than one (0.05 % of mirror rays).
     """
     _check.instance("judged", judged, Judged)
     resolved = judged.verdict != Verdict.UNRESOLVED
