@@ -42,6 +42,8 @@ RECORD_INTS = 7
 RECORD_FLOATS = 5
 """Depth at the screen's centre, ddx, ddy, farthest and nearest depth of the vertices."""
 
+REVISION = 16
+"""Records after which a tile finds out again behind which depth nothing can be seen."""
 HUGE = 1e300
 """Planes steeper than this would overflow while they are evaluated."""
 
@@ -492,6 +494,26 @@ def draw(record, ints, floats, left, top, right, bottom, cx, cy, keys):
                 )  # fmt: skip
 
 
+@inlined
+def farthest_of(keys, columns, rows, lowest_key):
+    """Return the farthest depth of a tile, 0 if a pixel is still empty.
+
+    lowest_key (TILE,) float64 is scratch: minima down the columns are independent of each other,
+    so they are taken side by side.
+    """
+    lowest_key[:] = np.inf
+    for j in range(rows):
+        line = keys[j * STRIDE : j * STRIDE + columns]
+        for i in range(columns):
+            key = line[i]
+            low = lowest_key[i] + 0.0  # see draw_pixels
+            lowest_key[i] = low if low < key else key
+    farthest = np.inf
+    for i in range(columns):
+        farthest = min(farthest, lowest_key[i])
+    return unpack(farthest)[0]
+
+
 @parallel_kernel
 def draw_tiles(tile_start, bins, ints, floats, tiles_x, cx, cy, lanes, depth, ddx, ddy, prim_id):
     """Draw every bin over what the images (H, W) already hold; (cx, cy) is the screen's centre."""
@@ -500,6 +522,7 @@ def draw_tiles(tile_start, bins, ints, floats, tiles_x, cx, cy, lanes, depth, dd
     largest = np.float64(np.finfo(np.float32).max)
     for lane in prange(lanes):
         keys = np.empty(TILE * STRIDE, np.float64)
+        lowest_key = np.empty(TILE, np.float64)
         for tile in range(lane, tiles, lanes):
             if tile_start[tile] == tile_start[tile + 1]:
                 continue
@@ -513,8 +536,15 @@ def draw_tiles(tile_start, bins, ints, floats, tiles_x, cx, cy, lanes, depth, dd
                     old = depth[top + j, left + i]
                     if old > 0.0:
                         keys[j * STRIDE + i] = pack(old, OLD)
+            hidden = np.float32(0.0)
+            until = tile_start[tile] + REVISION
             for at in range(tile_start[tile], tile_start[tile + 1]):
-                draw(bins[at], ints, floats, left, top, right, bottom, cx, cy, keys)
+                record = bins[at]
+                if at == until:
+                    hidden = farthest_of(keys, right - left + 1, bottom - top + 1, lowest_key)
+                    until += REVISION
+                if np.float32(floats[record, 4]) >= hidden:
+                    draw(record, ints, floats, left, top, right, bottom, cx, cy, keys)
             for j in range(bottom - top + 1):
                 for i in range(right - left + 1):
                     new, rank = unpack(keys[j * STRIDE + i])
