@@ -9,6 +9,7 @@ import numpy as np
 from hybrid_rt import _check, _threads
 from hybrid_rt.kernels import clip as clip_kernels
 from hybrid_rt.kernels import raster as kernels
+from hybrid_rt.kernels import tiles as tile_kernels
 from hybrid_rt.types import F32, I32, Camera, GBuffer, Scene
 
 BATCH_FACES = 1 << 21
@@ -84,7 +85,7 @@ def rasterize(
     with _threads.limited(threads) as lanes:
         _draw(scene, camera, lanes, depth, ddx, ddy, prim_id)
         if derivatives == "quad":
-            kernels.quad_differences(depth, ddx, ddy)
+            tile_kernels.quad_differences(depth, ddx, ddy)
     return GBuffer(depth, ddx, ddy, prim_id, scene, camera)
 
 
@@ -93,8 +94,8 @@ def _draw(
 ) -> None:
     """Draw all faces over the images, a batch at a time."""
     vertices, faces = scene.vertices, scene.faces
-    width, height, near = camera.width, camera.height, camera.near
-    eye = np.array(camera.eye)
+    width, height, near = camera.width, camera.height, float(camera.near)
+    eye = np.array(camera.eye, np.float64)
     m = camera.pixel_from_world
     f = camera.focal_px
     frame = np.stack(
@@ -135,7 +136,7 @@ def _draw(
             vertices, faces, first, eye, m, frame, width, height, near, xy, tiles_x,
             lanes, chunk, survivors, n_survivors, record_start, counts, ints, floats, bins,
         )  # fmt: skip
-        kernels.draw_tiles(
+        tile_kernels.draw_tiles(
             tile_start, bins, ints, floats, tiles_x, 0.5 * width, 0.5 * height, lanes,
             depth, ddx, ddy, prim_id,
         )  # fmt: skip
