@@ -80,7 +80,7 @@ def reflected_grey(rays: hrt.Rays, hits: hrt.Hits) -> F32:
     length = np.linalg.norm(rays.direction[met], axis=1)
     head = np.einsum("ij,ij->i", n, -rays.direction[met]) / np.where(length > 0, length, 1)
     sun = np.maximum(n @ SUN, 0)
-    grey[met] = 0.16 + 0.30 * (0.5 + 0.5 * n[:, 1]) + 0.26 * head + 0.24 * sun
+    grey[met] = 0.13 + 0.27 * (0.5 + 0.5 * n[:, 1]) + 0.22 * head + 0.22 * sun
     return np.clip(grey, 0, 1)
 
 

@@ -131,7 +131,6 @@ def table_errors(run: RunData) -> Table:
             "false hit",
             "false miss",
             "wrong primitive",
-            "off by > 1 px",
             "tie",
             "wrong, of all",
             "px p50",
@@ -143,7 +142,7 @@ def table_errors(run: RunData) -> Table:
             table.rows.append([_short(run, scene, technique)])
             rows = _of(_largest(run), technique=technique)
             for _, row in rows[rows.scene == scene].iterrows():
-                kinds = ("false_hit", "false_miss", "wrong_primitive", "pixel_error")
+                kinds = ("false_hit", "false_miss", "wrong_primitive")
                 table.rows.append(
                     [
                         f"{row.camera}, {int(row.width)}x{int(row.height)}",
@@ -158,8 +157,8 @@ def table_errors(run: RunData) -> Table:
     table.notes += [
         "Share of the resolved rays with its 95 % Clopper-Pearson interval, at each camera's "
         "largest resolution.",
-        "False hit: more than a pixel from the truth, and another primitive. Wrong primitive: "
-        "within a pixel. Off by > 1 px: whatever the primitive.",
+        "False hit: more than a pixel from the truth, or none there. Wrong primitive: another "
+        "triangle than the true one, within a pixel of the truth.",
         "Wrong, of all: false hits and false misses among all rays of the cell.",
     ]
     return table
