@@ -190,6 +190,13 @@ class NativeScene:
         _check_device(_library(), self._device, call)
 
 
+def usable(rays: Rays) -> tuple[Bool, F32]:
+    """Return which rays may be given to Embree, and the factors that their directions need."""
+    valid, scale = np.empty(len(rays), np.bool_), np.empty(len(rays), np.float32)
+    kernels.usable(rays.origin, rays.direction, rays.t_near, rays.t_far, valid, scale)
+    return valid, scale
+
+
 def _release(lib: ctypes.CDLL, device: int, scene: int, buffers: tuple[F32, ...]) -> None:
     # `buffers` is here so that the shared arrays outlive the scene.
     lib.rtcReleaseScene(scene)

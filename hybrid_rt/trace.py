@@ -4,23 +4,28 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid_rt import _check
+from hybrid_rt._embreex import EmbreexScene
 from hybrid_rt.embree import QUALITIES, WIDTHS, NativeScene, embree_info, packet_available
-from hybrid_rt.kernels import embree as embree_kernels
+from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels import trace as kernels
 from hybrid_rt.types import Bool, Hits, Rays, Scene
 
 __all__ = ["BruteForceTracer", "EmbreeTracer", "embree_info", "packet_available"]
 
 PATHS = ("packet", "run")
+
+# Embree's float32 products of coordinates leave its range beyond about 2**-45 and 2**45, and it
+# answers with misses; see test_scenes_beyond_the_range_of_embree_are_refused.
+SMALLEST_SCENE, LARGEST_SCENE = 2.0**-40, 2.0**40
 
 
 class EmbreeTracer:
@@ -47,7 +52,8 @@ class EmbreeTracer:
     Raises
     ------
     ArgumentError
-        An option that is not one of those above.
+        An option that is not one of those above; a scene so large or so small (beyond 2**40 or
+        2**-40) that Embree's arithmetic overflows or underflows.
     EmbreeError
         Path "packet" where the library cannot be reached (see `packet_available`), or an error that
         Embree reports.
@@ -82,6 +88,13 @@ class EmbreeTracer:
         _check.instance("scene", scene, Scene)
         _check.choice("build_quality", build_quality, QUALITIES)
         _check.choice("robust", robust, (True, False))
+        largest = float(np.abs(scene.vertices).max())
+        if largest != 0 and not SMALLEST_SCENE <= largest <= LARGEST_SCENE:
+            raise ArgumentError(
+                "scene",
+                f"a largest coordinate from {SMALLEST_SCENE:g} to {LARGEST_SCENE:g}",
+                f"{largest:g}",
+            )
         self._bvh = _Bvh(scene, _thread_count(threads), bool(robust), build_quality)
         self._set_path(path, width, coherent, threads)
 
@@ -168,7 +181,7 @@ class EmbreeTracer:
         -------
         Hits
         """
-        _check.instance("rays", rays, Rays)
+        rays = _checked(rays)
         if self._path == "run":
             return self._bvh.embreex.intersect(rays, self.threads)
         with _numba_threads(self.threads) as workers:
@@ -178,7 +191,7 @@ class EmbreeTracer:
 
     def occluded(self, rays: Rays) -> Bool:
         """Return, as (N,) bool, whether each ray hits anything between its t_near and t_far."""
-        _check.instance("rays", rays, Rays)
+        rays = _checked(rays)
         if self._path == "run":
             return self._bvh.embreex.occluded(rays, self.threads)
         with _numba_threads(self.threads) as workers:
@@ -208,6 +221,7 @@ class BruteForceTracer:
         _check.instance("scene", scene, Scene)
         _thread_count(threads)
         self._scene, self._threads = scene, threads
+        self._vertices, self._faces = _kernel_array(scene.vertices), _kernel_array(scene.faces)
 
     @property
     def threads(self) -> int:
@@ -221,12 +235,12 @@ class BruteForceTracer:
 
     def intersect(self, rays: Rays) -> Hits:
         """Return the nearest hit of each ray."""
-        _check.instance("rays", rays, Rays)
+        rays = _checked(rays)
         hits = Hits.empty(len(rays))
         with _numba_threads(self.threads):
             kernels.nearest(
                 rays.origin, rays.direction, rays.t_near, rays.t_far,
-                self._scene.vertices, self._scene.faces,
+                self._vertices, self._faces,
                 hits.t, hits.prim_id, hits.u, hits.v, hits.n_g,
             )  # fmt: skip
         return hits
@@ -256,107 +270,31 @@ class _Bvh:
         )
 
     @functools.cached_property
-    def embreex(self) -> _EmbreexScene:
-        return _EmbreexScene(self.scene, self.robust)
+    def embreex(self) -> EmbreexScene:
+        return EmbreexScene(self.scene, self.robust)
 
 
-class _EmbreexScene:
-    """A scene in embreex, traced by `EmbreeScene.run` with the traps of that call closed."""
-
-    CHUNK = 16384
-
-    def __init__(self, scene: Scene, robust: bool) -> None:
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
-        self._scene = EmbreeScene(robust=robust)
-        self._mesh = TriangleMesh(self._scene, scene.vertices, scene.faces)
-        # The first run builds, without a lock: it must be over before threads come.
-        self._scene.run(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32))
-
-    def intersect(self, rays: Rays, threads: int) -> Hits:
-        usable = _usable(rays)
-        if not usable.all():
-            hits = Hits.empty(len(rays))
-            _put(hits, usable, self.intersect(rays.take(usable), threads))
-            return hits
-        hits = self._from_zero(rays, threads)
-        early = np.flatnonzero(hits.t < rays.t_near)
-        if len(early):
-            _put(hits, early, self._displaced(rays.take(early), threads))
-        return hits
-
-    def occluded(self, rays: Rays, threads: int) -> Bool:
-        hit = np.zeros(len(rays), np.bool_)
-        usable = _usable(rays)
-        # A hit before t_near would end an occlusion query, so rays with one ask for the hit.
-        late = usable & (rays.t_near > 0)
-        hit[late] = self.intersect(rays.take(late), threads).prim_id >= 0
-        rest = usable & ~late
-        part = rays.take(rest)
-        found = np.empty(len(part), np.int32)
-        t_far = part.t_far.copy()  # run overwrites it
-
-        def one(s: slice) -> None:
-            found[s] = self._scene.run(
-                part.origin[s], part.direction[s], dists=t_far[s], query="OCCLUDED"
-            )
-
-        _in_chunks(one, len(part), self.CHUNK, threads)
-        hit[rest] = found == 0  # 0 for a hit, -1 for none
-        return hit
-
-    def _from_zero(self, rays: Rays, threads: int) -> Hits:
-        """Return the nearest hits with 0 <= t <= t_far of usable rays."""
-        hits = Hits.empty(len(rays))
-        t_far = rays.t_far.copy()  # run overwrites it
-
-        def one(s: slice) -> None:
-            found = self._scene.run(rays.origin[s], rays.direction[s], dists=t_far[s], output=True)
-            # u, v and Ng of a miss are those of the ray before it.
-            hit = found["primID"] >= 0
-            np.copyto(hits.t[s], found["tfar"], where=hit)
-            np.copyto(hits.prim_id[s], found["primID"], where=hit)
-            np.copyto(hits.u[s], found["u"], where=hit)
-            np.copyto(hits.v[s], found["v"], where=hit)
-            np.copyto(hits.n_g[s], found["Ng"], where=hit[:, None])
-
-        _in_chunks(one, len(rays), self.CHUNK, threads)
-        return hits
-
-    def _displaced(self, rays: Rays, threads: int) -> Hits:
-        """Return the nearest hits of usable rays, traced from the float32 point at their t_near."""
-        start = rays.origin + rays.t_near[:, None].astype(np.float64) * rays.direction
-        with np.errstate(over="ignore"):
-            origin = start.astype(np.float32)
-        t_far = rays.t_far - rays.t_near
-        moved = Rays(origin, rays.direction, rays.pixel, np.zeros_like(t_far), t_far)
-        hits = self.intersect(moved, threads)
-        np.add(hits.t, rays.t_near, out=hits.t)
-        return hits
+def _checked(rays: Rays) -> Rays:
+    """Return rays whose arrays a kernel may have: a length that differs would be read past."""
+    _check.instance("rays", rays, Rays)
+    n = len(rays)
+    arrays = []
+    for name, shape, dtype in (
+        ("origin", ("N", 3), np.float32),
+        ("direction", ("N", 3), np.float32),
+        ("pixel", ("N", 2), np.int32),
+        ("t_near", ("N",), np.float32),
+        ("t_far", ("N",), np.float32),
+    ):
+        value = _check.array(f"rays.{name}", getattr(rays, name), shape, dtype)
+        _check.same_length(f"rays.{name}", value, "rays.origin", n)
+        arrays.append(_kernel_array(value))
+    return Rays(*arrays)
 
 
-def _put(hits: Hits, where: Any, values: Hits) -> None:
-    """Write `values` into `hits` at an index or boolean array."""
-    for name in ("t", "prim_id", "u", "v", "n_g"):
-        getattr(hits, name)[where] = getattr(values, name)
-
-
-def _usable(rays: Rays) -> Bool:
-    """Return which rays may be given to Embree."""
-    usable = np.empty(len(rays), np.bool_)
-    embree_kernels.usable(rays.origin, rays.direction, rays.t_near, rays.t_far, usable)
-    return usable
-
-
-def _in_chunks(work: Callable[[slice], None], n: int, size: int, threads: int) -> None:
-    slices = [slice(start, min(start + size, n)) for start in range(0, n, size)]
-    if threads == 1 or len(slices) < 2:
-        for s in slices:
-            work(s)
-    else:
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(work, slices))
+def _kernel_array(value: NDArray[Any]) -> NDArray[Any]:
+    # A read-only array has a type of its own in Numba and would compile every kernel again.
+    return np.require(value, requirements=["C", "W"])
 
 
 def _thread_count(threads: int | None) -> int:

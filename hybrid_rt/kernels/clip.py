@@ -16,9 +16,9 @@ SUBPIXEL_BITS = 8
 ONE = 1 << SUBPIXEL_BITS
 HALF = ONE >> 1
 
-GUARD_LOW = -32768.0
+GUARD_LOW = -16384.0
 """Smallest screen coordinate in pixels that is snapped without clipping."""
-GUARD_HIGH = 65536.0
+GUARD_HIGH = 49152.0
 """Largest one; the screen itself ends at 32768."""
 
 OUT_LEFT, OUT_RIGHT, OUT_TOP, OUT_BOTTOM = 1, 2, 4, 8

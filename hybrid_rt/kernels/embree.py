@@ -6,7 +6,8 @@ holds nothing of this process and can be cached on disk.
 A packet of `width` rays is field by field in memory (RTCRayHit4/8/16), and for width 1 that is the
 layout of RTCRayHit too: origin 0 to 2, tnear 3, direction 4 to 6, time 7, tfar 8, mask 9, id 10,
 flags 11, Ng 12 to 14, u 15, v 16, primID 17, geomID 18, instID 19. Embree built with instance
-arrays has instPrimID as field 20; room is kept for it either way.
+arrays has instPrimID as field 20; room is kept for it either way. Field 21 is ours: the factor
+by which the direction was multiplied.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from numba.extending import intrinsic
 
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
 
-FIELDS = 21
+SCALE = 21
+FIELDS = 22
 CHUNK = 512  # rays that a thread takes at a time; a multiple of every width
 
 
@@ -86,6 +88,19 @@ def _usable(o, d, near, far):
 
 
 @inlined
+def _scale(d):
+    """Return a power of two that makes a direction one that Embree can follow: mostly 1.
+
+    Embree inverts no component below 1e-18 and overflows with very long ones: without this, rays
+    with directions shorter than 2**-55 miss what lies in front of them.
+    """
+    largest = max(abs(d[0]), abs(d[1]), abs(d[2]))
+    if largest >= 2.0**-40 and largest <= 2.0**40:
+        return np.float32(1.0)
+    return np.float32(math.ldexp(1.0, min(-math.frexp(largest)[1], 127)))
+
+
+@inlined
 def _load(first, width, origin, direction, t_near, t_far, packet, words, valid):
     """Fill a packet from ray `first` on; return whether any of its lanes is valid."""
     n = len(origin)
@@ -94,21 +109,23 @@ def _load(first, width, origin, direction, t_near, t_far, packet, words, valid):
         i = first + k
         if i < n and _usable(origin[i], direction[i], t_near[i], t_far[i]):
             some = True
+            scale = _scale(direction[i])
             valid[k] = -1
             packet[k] = origin[i, 0]
             packet[width + k] = origin[i, 1]
             packet[2 * width + k] = origin[i, 2]
-            packet[3 * width + k] = t_near[i]
-            packet[4 * width + k] = direction[i, 0]
-            packet[5 * width + k] = direction[i, 1]
-            packet[6 * width + k] = direction[i, 2]
-            packet[8 * width + k] = t_far[i]
+            packet[3 * width + k] = t_near[i] / scale
+            packet[4 * width + k] = direction[i, 0] * scale
+            packet[5 * width + k] = direction[i, 1] * scale
+            packet[6 * width + k] = direction[i, 2] * scale
+            packet[8 * width + k] = t_far[i] / scale
             words[9 * width + k] = -1
+            packet[SCALE * width + k] = scale
         else:
             valid[k] = 0
             for field in range(10):
                 packet[field * width + k] = 0.0
-        for field in range(17, FIELDS):
+        for field in range(17, SCALE):
             words[field * width + k] = -1
     return some
 
@@ -119,7 +136,7 @@ def _store(first, width, packet, words, t, prim_id, u, v, n_g):
     for k in range(min(width, len(t) - first)):
         i = first + k
         if words[18 * width + k] == 0:  # the one geometry of the scene
-            t[i] = packet[8 * width + k]
+            t[i] = packet[8 * width + k] * packet[SCALE * width + k]
             prim_id[i] = words[17 * width + k]
             n_g[i, 0] = packet[12 * width + k]
             n_g[i, 1] = packet[13 * width + k]
@@ -197,7 +214,8 @@ def occluded(
 
 
 @kernel
-def usable(origin, direction, t_near, t_far, out):
-    """Set `out` (N,) bool where a ray may be given to Embree."""
+def usable(origin, direction, t_near, t_far, out, scale):
+    """Set `out` (N,) bool where a ray may go to Embree, `scale` (N,) to its direction's factor."""
     for i in range(len(origin)):
         out[i] = _usable(origin[i], direction[i], t_near[i], t_far[i])
+        scale[i] = _scale(direction[i]) if out[i] else np.float32(1.0)

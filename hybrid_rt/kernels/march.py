@@ -28,7 +28,7 @@ HALF = np.float32(0.5)
 INF = np.float32(np.inf)
 
 
-@kernel
+@inlined
 def screen_ray(ox, oy, oz, dx, dy, dz, t_near, t_far, m, eye, near, width, height):
     """Return (status, x, y, depth, delta x, y, depth, s_end, z, qd_z); paper: "Initialise".
 
@@ -149,7 +149,7 @@ def tilted_plane_s(
     return first + (last - first) * (in_front / (in_front - behind))
 
 
-@kernel
+@inlined
 def march_ray(
     status,
     x,
@@ -282,41 +282,42 @@ def march_ray(
     return HIT, hit_x, hit_y, hit, min(s, hit), steps
 
 
-@inlined
-def march_one(
-    i, origin, direction, ray_pixel, t_near, t_far, depth, ddx, ddy, prim_id,
+@kernel
+def march_chunk(
+    first, last, origin, direction, ray_pixel, t_near, t_far, depth, ddx, ddy, prim_id,
     cells, offsets, widths, m, eye, near, samples, max_steps,
     status, pixel, prim, t, t_free, steps, steps_by_level,
 ):  # fmt: skip
-    """Set up ray i in float64, march it in float32 and write its row of the outputs."""
+    """Set up rays in float64, march them in float32 and write their rows of the outputs."""
     height, width = depth.shape
-    start = np.float64(t_near[i])
-    end, x, y, z0, dx, dy, dz, s_end, z, gz = screen_ray(
-        np.float64(origin[i, 0]), np.float64(origin[i, 1]), np.float64(origin[i, 2]),
-        np.float64(direction[i, 0]), np.float64(direction[i, 1]), np.float64(direction[i, 2]),
-        start, np.float64(t_far[i]), m, eye, near, width, height,
-    )  # fmt: skip
-    how, hit_x, hit_y, s_hit, s_free, count = end, -1, -1, F0, F0, 0
-    if s_end >= 0.0:
-        how, hit_x, hit_y, s_hit, s_free, count = march_ray(
-            end, np.float32(x), np.float32(y), np.float32(z0),
-            np.float32(dx), np.float32(dy), np.float32(dz), np.float32(s_end),
-            ray_pixel[i, 0], ray_pixel[i, 1], depth, ddx, ddy,
-            cells, offsets, widths, samples, max_steps, steps_by_level,
+    for i in range(first, last):
+        start = np.float64(t_near[i])
+        end, x, y, z0, dx, dy, dz, s_end, z, gz = screen_ray(
+            np.float64(origin[i, 0]), np.float64(origin[i, 1]), np.float64(origin[i, 2]),
+            np.float64(direction[i, 0]), np.float64(direction[i, 1]), np.float64(direction[i, 2]),
+            start, np.float64(t_far[i]), m, eye, near, width, height,
         )  # fmt: skip
-    status[i] = how
-    pixel[i, 0] = hit_x
-    pixel[i, 1] = hit_y
-    steps[i] = count
-    t_free[i] = t_far[i] if how == MISS else ray_t(np.float64(s_free), z, gz, start)
-    if s_end < 0.0:
-        t_free[i] = 0.0
-    if how == HIT:
-        prim[i] = prim_id[hit_y, hit_x]
-        t[i] = ray_t(np.float64(s_hit), z, gz, start)
-    else:
-        prim[i] = -1
-        t[i] = np.inf
+        how, hit_x, hit_y, s_hit, s_free, count = end, -1, -1, F0, F0, 0
+        if s_end >= 0.0:
+            how, hit_x, hit_y, s_hit, s_free, count = march_ray(
+                end, np.float32(x), np.float32(y), np.float32(z0),
+                np.float32(dx), np.float32(dy), np.float32(dz), np.float32(s_end),
+                ray_pixel[i, 0], ray_pixel[i, 1], depth, ddx, ddy,
+                cells, offsets, widths, samples, max_steps, steps_by_level,
+            )  # fmt: skip
+        status[i] = how
+        pixel[i, 0] = hit_x
+        pixel[i, 1] = hit_y
+        steps[i] = count
+        t_free[i] = t_far[i] if how == MISS else ray_t(np.float64(s_free), z, gz, start)
+        if s_end < 0.0:
+            t_free[i] = 0.0
+        if how == HIT:
+            prim[i] = prim_id[hit_y, hit_x]
+            t[i] = ray_t(np.float64(s_hit), z, gz, start)
+        else:
+            prim[i] = -1
+            t[i] = np.inf
 
 
 @parallel_kernel
@@ -331,10 +332,9 @@ def march(
     for worker in prange(workers):
         first = fetch_add(taken.ctypes.data, CHUNK)
         while first < n:
-            for i in range(first, min(n, first + CHUNK)):
-                march_one(
-                    i, origin, direction, ray_pixel, t_near, t_far, depth, ddx, ddy, prim_id,
-                    cells, offsets, widths, m, eye, near, samples, max_steps,
-                    status, pixel, prim, t, t_free, steps, steps_by_level[worker],
-                )  # fmt: skip
+            march_chunk(
+                first, min(n, first + CHUNK), origin, direction, ray_pixel, t_near, t_far,
+                depth, ddx, ddy, prim_id, cells, offsets, widths, m, eye, near, samples, max_steps,
+                status, pixel, prim, t, t_free, steps, steps_by_level[worker],
+            )  # fmt: skip
             first = fetch_add(taken.ctypes.data, CHUNK)

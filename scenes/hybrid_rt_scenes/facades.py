@@ -12,13 +12,12 @@ from functools import partial
 
 import numpy as np
 
+from hybrid_rt_scenes.builder import Builder, choose_detail
 from hybrid_rt_scenes.primitives import (
     EMPTY,
     F64,
-    Builder,
     Part,
     boxes,
-    choose_detail,
     join,
     lathe,
     leaves,
@@ -27,6 +26,7 @@ from hybrid_rt_scenes.primitives import (
     surface,
     tubes,
 )
+from hybrid_rt_scenes.walls import moulding, opening
 
 GROUND_HEIGHT = 4.0
 STOREY_HEIGHT = 3.2
@@ -74,47 +74,6 @@ class Facade:
     def put(self, part: Part) -> Part:
         """Return a part of the facade's own frame in the world."""
         return place(part, self.corner, self.yaw)
-
-
-def _opening(x0: float, x1: float, y0: float, y1: float, deep: float, arch: int) -> Part:
-    """Return the wall of a unit cell with a hole, its reveals and the pane at its back.
-
-    With `arch` > 0 the hole ends in a half ellipse of that many pieces above `y1`.
-    """
-    outline = [[x0, y0], [x0, y1]]
-    outer = [[0.0, y0], [0.0, 1.0]]
-    rise = 0.6 * (1 - y1) if arch else 0.0
-    for k in range(1, arch):
-        turn = np.pi * (1 - k / arch)
-        middle, half = (x0 + x1) / 2, (x1 - x0) / 2
-        outline.append([middle + half * np.cos(turn), y1 + rise * np.sin(turn)])
-        outer.append([k / arch, 1.0])
-    outline += [[x1, y1], [x1, y0]]
-    outer += [[1.0, 1.0], [1.0, y0]]
-    inside = np.column_stack([outline, np.zeros(len(outline))])
-    outside = np.column_stack([outer, np.zeros(len(outer))])
-    parts = [
-        surface([outside, inside]),
-        surface([inside, inside - [0, 0, deep]]),
-        quad([x0, y0, 0], [x1 - x0, 0, 0], [0, 0, -deep]),
-        quad([x0, y0, -deep], [x1 - x0, 0, 0], [0, y1 + rise - y0, 0]),
-    ]
-    if y0 > 0:
-        parts.append(quad([0, 0, 0], [1, 0, 0], [0, y0, 0]))
-    return join(parts)
-
-
-def _moulding(x0: float, x1: float, y: float, tall: float, out: float, detail: int) -> Part:
-    """Return a ledge with a swelling profile and closed ends; `detail` rounds it."""
-    k = 3 + 2 * detail
-    s = np.linspace(0, 1, k)
-    swell = out * (0.35 + 0.65 * s**0.7) * (1 + 0.08 * np.sin(6 * np.pi * s))
-    profile = np.vstack([[y, 0.0], np.column_stack([y + tall * s, swell]), [y + tall, 0.0]])
-    left = np.column_stack([np.full(len(profile), x0), profile])
-    right = np.column_stack([np.full(len(profile), x1), profile])
-    back = np.array([0.0, 0.0, 1.0])
-    ends = [surface([e, e - e * back]) for e in (left[1:-1], right[1:-1])]
-    return join([surface([left, right]), *ends])
 
 
 def _bars(x0: float, x1: float, y0: float, y1: float, z: float, across: int, up: int) -> Part:
@@ -171,16 +130,16 @@ def window_bay(detail: int, style: int) -> tuple[Part, Part]:
         return quad([0, 0, 0], [1, 0, 0], [0, 1, 0]), EMPTY
     x0, x1, y0, y1 = 0.29, 0.71, 0.26, 0.78
     arch = 2 + 2 * detail if style == 1 else 0
-    wall = _opening(x0, x1, y0, y1, 0.22, arch)
+    wall = opening(x0, x1, y0, y1, 0.22, arch)
     parts: list[Part] = []
     if detail >= 2:
         parts.append(_bars(x0, x1, y0, y1, -0.2, 2, 3))
-        parts.append(_moulding(x0 - 0.05, x1 + 0.05, y0 - 0.035, 0.035, 0.12, detail - 2))
+        parts.append(moulding(x0 - 0.05, x1 + 0.05, y0 - 0.035, 0.035, 0.12, detail - 2))
     if detail >= 3:
         if style == 0:
             slats = 2 + 2 * detail
             parts += [_shutter(0.07, 0.27, y0, y1, slats), _shutter(0.73, 0.93, y0, y1, slats)]
-            parts.append(_moulding(x0 - 0.06, x1 + 0.06, y1 + 0.05, 0.06, 0.16, detail))
+            parts.append(moulding(x0 - 0.06, x1 + 0.06, y1 + 0.05, 0.06, 0.16, detail))
         elif style == 1:
             parts.append(_balcony(x0 - 0.14, x1 + 0.14, y0 - 0.1, detail - 3))
         else:
@@ -189,7 +148,7 @@ def window_bay(detail: int, style: int) -> tuple[Part, Part]:
             n = 12 * (detail - 2) ** 2
             at = rng.uniform([x0, y0 + 0.05, 0.0], [x1, y0 + 0.17, 0.24], (n, 3))
             parts.append(leaves(at, 0.2 / np.sqrt(detail), rng))
-            parts.append(_moulding(x0 - 0.04, x1 + 0.04, y1, 0.05, 0.1, detail))
+            parts.append(moulding(x0 - 0.04, x1 + 0.04, y1, 0.05, 0.1, detail))
     return wall, join(parts)
 
 
@@ -199,7 +158,7 @@ def shop_bay(detail: int, door: bool) -> tuple[Part, Part]:
         return quad([0, 0, 0], [1, 0, 0], [0, 1, 0]), EMPTY
     parts: list[Part] = []
     if door:
-        wall = _opening(0.28, 0.72, 0.0, 0.62, 0.35, 2 + 2 * detail)
+        wall = opening(0.28, 0.72, 0.0, 0.62, 0.35, 2 + 2 * detail)
         if detail >= 2:
             x, y = np.meshgrid([0.32, 0.53], [0.05, 0.24, 0.43])
             low = np.column_stack([x.ravel(), y.ravel(), np.full(6, -0.36)])
@@ -208,13 +167,13 @@ def shop_bay(detail: int, door: bool) -> tuple[Part, Part]:
             parts.append(knob.moved([0.5, 0.3, -0.3]))
             parts.append(boxes([0.22, 0.0, 0.0], [0.78, 0.035, 0.3]))
     else:
-        wall = _opening(0.08, 0.92, 0.2, 0.72, 0.25, 0)
+        wall = opening(0.08, 0.92, 0.2, 0.72, 0.25, 0)
         if detail >= 2:
             parts.append(_bars(0.08, 0.92, 0.2, 0.72, -0.22, 3, 2))
             low = np.array([[0.1 + 0.28 * k, 0.04, 0.0] for k in range(3)])
             parts.append(boxes(low, np.add(low, [0.24, 0.12, 0.04])))
     if detail >= 2:
-        parts.append(_moulding(0.0, 1.0, 0.9, 0.07, 0.18, detail - 2))
+        parts.append(moulding(0.0, 1.0, 0.9, 0.07, 0.18, detail - 2))
         n, sides = 2 + detail, 4 + detail
         pilaster = lathe(
             [[0.05, 0.0], [0.035, 0.04], [0.03, 0.5], [0.035, 0.86], [0.06, 0.9]], sides
@@ -297,11 +256,11 @@ def _trim(facade: Facade, budget: float) -> Part:
     w, h = facade.width, facade.height
 
     def make(detail: int) -> Part:
-        cornice = _moulding(-0.1, w + 0.1, h - 0.45, 0.45, 0.55, detail)
+        cornice = moulding(-0.1, w + 0.1, h - 0.45, 0.45, 0.55, detail)
         parts = [cornice]
         if detail >= 1:
             storeys = [GROUND_HEIGHT + STOREY_HEIGHT * k for k in range(facade.storeys)]
-            parts += [_moulding(0, w, y - 0.12, 0.18, 0.14, detail - 1) for y in storeys]
+            parts += [moulding(0, w, y - 0.12, 0.18, 0.14, detail - 1) for y in storeys]
             dormers = 0.5 + np.arange(facade.bays // 2) * 2
             x = dormers * w / facade.bays
             low = np.column_stack([x, np.full(len(x), h + 0.4), np.full(len(x), -1.6)])

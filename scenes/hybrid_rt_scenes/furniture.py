@@ -17,7 +17,7 @@ from hybrid_rt_scenes.primitives import (
 )
 
 
-def _smooth(profile: list[list[float]], detail: int) -> F64:
+def smooth(profile: list[list[float]], detail: int) -> F64:
     """Return a profile with `detail` further points in each of its pieces, rounded."""
     p = np.array(profile)
     if detail <= 0:
@@ -31,6 +31,7 @@ def _smooth(profile: list[list[float]], detail: int) -> F64:
     curve = 0.5 * (
         2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t**2 + (3 * b - a - 3 * c + d) * t**3
     )
+    curve[0], curve[-1] = p[0], p[-1]  # to the bit, so that a pole stays a pole
     # A curve that swings below the axis would pinch the surface.
     curve[1:-1, 0] = np.maximum(curve[1:-1, 0], 0.004)
     return np.asarray(curve)
@@ -76,12 +77,12 @@ def table(detail: int) -> Part:
     """Return a round cafe table of 0.72 m with a cup on it."""
     sides = 5 + 3 * detail
     top = lathe([[0, 0.7], [0.36, 0.7], [0.36, 0.72], [0, 0.72]], sides)
-    stem = lathe(_smooth([[0.03, 0.04], [0.025, 0.3], [0.04, 0.5], [0.025, 0.7]], detail), sides)
+    stem = lathe(smooth([[0.03, 0.04], [0.025, 0.3], [0.04, 0.5], [0.025, 0.7]], detail), sides)
     foot = lathe([[0.22, 0], [0.2, 0.03], [0.03, 0.05]], sides)
     parts = [top, stem, foot]
     if detail:
         cup = lathe(
-            _smooth([[0, 0.72], [0.03, 0.725], [0.042, 0.79], [0.036, 0.79], [0, 0.74]], detail),
+            smooth([[0, 0.72], [0.03, 0.725], [0.042, 0.79], [0.036, 0.79], [0, 0.74]], detail),
             sides,
         )
         parts += [cup.moved([0.12, 0, 0.05]), cup.moved([-0.14, 0, 0.1])]
@@ -92,7 +93,7 @@ def lamp(detail: int) -> Part:
     """Return a street lamp of 4.2 m with two lanterns on bent arms."""
     sides = 4 + detail
     post = lathe(
-        _smooth(
+        smooth(
             [[0.2, 0], [0.19, 0.25], [0.1, 0.35], [0.12, 0.5], [0.07, 0.65], [0.055, 2.2],
              [0.09, 2.3], [0.05, 2.4], [0.045, 3.9], [0.08, 4.0], [0.0, 4.2]],
             detail,
@@ -103,7 +104,7 @@ def lamp(detail: int) -> Part:
     arm = np.column_stack([0.6 * s, 3.5 + 0.35 * np.sin(1.3 * np.pi * s), 0 * s])
     arms = tubes(np.stack([arm, arm * [-1, 1, 1]]), 0.025, max(3, sides - 1))
     lantern = lathe(
-        _smooth(
+        smooth(
             [[0, -0.5], [0.1, -0.46], [0.16, -0.1], [0.2, -0.06], [0.06, 0.08], [0, 0.12]],
             detail // 2,
         ),
@@ -116,7 +117,7 @@ def lamp(detail: int) -> Part:
 def vase(detail: int) -> Part:
     """Return a vase 0.9 m tall, open at the top."""
     return lathe(
-        _smooth(
+        smooth(
             [[0.0, 0], [0.24, 0.0], [0.24, 0.08], [0.12, 0.14], [0.3, 0.42], [0.34, 0.6],
              [0.22, 0.76], [0.3, 0.9], [0.26, 0.88], [0.18, 0.74], [0.0, 0.7]],
             detail,
@@ -141,7 +142,7 @@ def parasol(detail: int) -> Part:
 def bollard(detail: int) -> Part:
     """Return a cast bollard of 0.9 m."""
     return lathe(
-        _smooth([[0.12, 0], [0.11, 0.1], [0.07, 0.16], [0.06, 0.7], [0.09, 0.74], [0.08, 0.84],
+        smooth([[0.12, 0], [0.11, 0.1], [0.07, 0.16], [0.06, 0.7], [0.09, 0.74], [0.08, 0.84],
                  [0, 0.92]], detail), 5 + 2 * detail
     )  # fmt: skip
 

@@ -7,7 +7,7 @@ Every function returns a `Part`, works in float64 and has no loop over triangles
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -213,33 +213,6 @@ def cobbles(centres: F64, half: ArrayLike, height: ArrayLike, yaw: ArrayLike, ro
     return place(template, centres, yaw, np.stack([h[:, 0], tall, h[:, 1]], axis=1))
 
 
-class Builder:
-    """Collects parts, each under an object id of its own, and counts their triangles."""
-
-    def __init__(self) -> None:
-        self._parts: list[Part] = []
-        self._ids: list[int] = []
-        self.triangles = 0
-
-    def add(self, *parts: Part) -> None:
-        """Add parts that are one object together."""
-        part = join(parts)
-        if part.triangles:
-            self._parts.append(part)
-            self._ids.append(len(self._ids))
-            self.triangles += part.triangles
-
-    def arrays(self) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
-        """Return vertices float32, faces and object ids int32."""
-        whole = join(self._parts)
-        ids = np.repeat(self._ids, [p.triangles for p in self._parts])
-        return (
-            whole.vertices.astype(np.float32),
-            whole.faces.astype(np.int32),
-            ids.astype(np.int32),
-        )
-
-
 def catenary(start: ArrayLike, end: ArrayLike, sag: ArrayLike, points: int) -> F64:
     """Return (n, points, 3) hanging lines between (n, 3) ends; `sag` is the drop at mid span."""
     a, b = np.atleast_2d(np.asarray(start, float)), np.atleast_2d(np.asarray(end, float))
@@ -255,13 +228,3 @@ def scatter_in_ball(n: int, rng: np.random.Generator, shell: float = 0.0) -> F64
     d = rng.normal(size=(n, 3))
     d /= np.linalg.norm(d, axis=1, keepdims=True)
     return d * np.cbrt(rng.uniform(shell**3, 1, size=(n, 1)))
-
-
-def choose_detail(cost: Any, budget: float, most: int) -> int:
-    """Return the largest detail from 0 to `most` whose `cost(detail)` is within `budget`."""
-    chosen = 0
-    for detail in range(1, most + 1):
-        if cost(detail) > budget:
-            break
-        chosen = detail
-    return chosen

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import hybrid_rt as hrt
-from hybrid_rt_scenes.primitives import Builder, Part, boxes, place, quad
+from hybrid_rt_scenes.builder import Builder
+from hybrid_rt_scenes.primitives import Part, boxes, place, quad
 
 
 def geodesic(frequency: int, radius: float) -> Part:

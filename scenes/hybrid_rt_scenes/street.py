@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 import hybrid_rt as hrt
+from hybrid_rt_scenes.builder import Builder, choose_detail
 from hybrid_rt_scenes.facades import Facade, add_bays, add_tops, awning
 from hybrid_rt_scenes.furniture import bollard, cables, chair, lamp, parasol, table, vase
 from hybrid_rt_scenes.plants import Tree, foliage, ivy, wood
 from hybrid_rt_scenes.primitives import (
     F64,
-    Builder,
     Part,
     boxes,
-    choose_detail,
     cobbles,
     join,
     leaves,
-    place,
     quad,
     scatter_in_ball,
 )
@@ -159,17 +155,6 @@ def _stones(x: F64, z: F64, y: float, pitch: float, rounds: int, rng: np.random.
     return cobbles(at, half, height, rng.normal(0, 0.04, n), rounds)
 
 
-def _fill(
-    builder: Builder, make: Callable[[int], Part], at: F64, yaw: F64, budget: float, most: int = 14
-) -> None:
-    """Add copies of a thing, as detailed as `budget` allows, and fewer if even that is too much."""
-    detail = choose_detail(lambda d: make(d).triangles * len(at), budget, most)
-    part = make(detail)
-    n = min(len(at), int(budget // part.triangles))
-    if n:
-        builder.add(place(part, at[:n], yaw[:n]))
-
-
 def _add_furniture(builder: Builder, budget: float, rng: np.random.Generator) -> None:
     square = np.stack(np.meshgrid([7.6, 9.7, 11.8], [-7.4, -4.6, 4.4, 7.2]), axis=-1).reshape(-1, 2)
     kerb = np.array([[-5.0, z] for z in (-19.0, -16.6, -14.2, 3.2, 5.6, 8.0)])
@@ -180,15 +165,15 @@ def _add_furniture(builder: Builder, budget: float, rng: np.random.Generator) ->
     around = np.stack([np.sin(turn), 0 * turn, np.cos(turn)], axis=1)
     chairs = np.repeat(tables, 3, axis=0) + 0.62 * around
     chairs[:, 0] = np.maximum(chairs[:, 0], -5.7)
-    _fill(builder, chair, chairs, turn + np.pi, 0.5 * budget)
-    _fill(builder, table, tables, np.zeros(18), 0.15 * budget)
+    builder.fill(chair, chairs, turn + np.pi, 0.5 * budget)
+    builder.fill(table, tables, np.zeros(18), 0.15 * budget)
     shades = tables[[0, 4, 5, 8, 11]]
-    _fill(builder, parasol, shades, turn[::3][:5], 0.05 * budget)
+    builder.fill(parasol, shades, turn[::3][:5], 0.05 * budget)
     z = np.arange(-33.0, 34.0, 3.0)
     posts = np.concatenate([[[s * 3.7, _KERB, v] for v in z] for s in (-1, 1)])
-    _fill(builder, bollard, posts, np.zeros(len(posts)), 0.15 * budget)
+    builder.fill(bollard, posts, np.zeros(len(posts)), 0.15 * budget)
     pots = np.array([[s * 5.5, _KERB, v] for s in (-1, 1) for v in (-30.0, -23, 13, 20, 28)])
-    _fill(builder, vase, pots, np.zeros(len(pots)), 0.15 * budget)
+    builder.fill(vase, pots, np.zeros(len(pots)), 0.15 * budget)
 
 
 def _add_awnings(builder: Builder, facades: list[Facade], budget: float) -> None:
@@ -227,7 +212,7 @@ def _add_lines(builder: Builder, budget: float, rng: np.random.Generator) -> Non
         for part in make(detail):
             builder.add(part)
     posts = [[s * 3.9, _KERB, v] for v in (-29.0, -17, -5, 7, 19, 31) for s in (-1, 1)]
-    _fill(builder, lamp, np.array(posts), np.zeros(12), 0.5 * budget)
+    builder.fill(lamp, np.array(posts), np.zeros(12), 0.5 * budget)
 
 
 def _add_plants(builder: Builder, size: int, rng: np.random.Generator) -> None:

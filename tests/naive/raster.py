@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
-GUARD_LOW, GUARD_HIGH = -32768.0, 65536.0
+GUARD_LOW, GUARD_HIGH = -16384.0, 49152.0
 
 
 class View:
