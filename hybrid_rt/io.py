@@ -77,10 +77,10 @@ def read_mesh(path: str | Path) -> Mesh:
 
 
 def _read_npz(path: Path) -> Mesh:
+    if not zipfile.is_zipfile(path):
+        raise MeshFileError(f"{path}: truncated, or not an .npz archive at all")
     try:
         with np.load(path, allow_pickle=False) as archive:
-            if not isinstance(archive, np.lib.npyio.NpzFile):
-                raise MeshFileError(f"{path}: a single array, not an .npz archive")
             missing = [key for key in ("vertices", "faces") if key not in archive.files]
             if missing:
                 held = ", ".join(archive.files) or "nothing"
@@ -91,7 +91,7 @@ def _read_npz(path: Path) -> Mesh:
             object_id = archive["object_id"] if "object_id" in archive.files else None
     except _TRUNCATED as error:
         raise MeshFileError(f"{path}: truncated or corrupt .npz archive ({error})") from error
-    except (ValueError, AttributeError) as error:
+    except ValueError as error:
         # NumPy says so of objects, which would have to be unpickled, and of broken headers.
         raise MeshFileError(f"{path}: not an .npz of plain numeric arrays ({error})") from error
     return Mesh.from_arrays(vertices, faces, object_id)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import hybrid_rt as hrt
+from hybrid_rt import _check
 from hybrid_rt_scenes.builder import Builder, choose_detail
 from hybrid_rt_scenes.furniture import vase
 from hybrid_rt_scenes.ornament import (
@@ -99,12 +100,10 @@ def atrium(size: int = 2**18, seed: int = 1) -> hrt.Mesh:
     Raises
     ------
     ArgumentError
-        `size` or `seed` out of range.
+        `size` or `seed` is not an integer or out of range.
     """
-    if not SMALLEST <= size <= LARGEST:
-        raise hrt.ArgumentError("size", f"{SMALLEST} to {LARGEST} triangles", repr(size))
-    if seed < 0:
-        raise hrt.ArgumentError("seed", "an integer >= 0", repr(seed))
+    _check.integer("size", size, least=SMALLEST, most=LARGEST)
+    _check.integer("seed", seed, least=0)
     rng = np.random.default_rng(seed)
     builder = Builder()
     _add_shell(builder, 0.05 * size)

@@ -62,10 +62,11 @@ def foliage(
     for tree, tips, n in zip(trees, twigs, numbers, strict=True):
         middle = np.add(tree.at, [0, tree.crown, 0])
         loose = middle + 0.85 * tree.radius * scatter_in_ball(n, rng) * [1, 0.85, 1]
-        centres = rng.choice(tips, min(len(tips), 60), replace=False)
+        centres = rng.choice(tips, min(len(tips), 24), replace=False)
         clumps = centres[rng.integers(0, len(centres), n)]
-        near = clumps + 0.3 * tree.radius * scatter_in_ball(n, rng) * [1, 0.7, 1]
-        where = np.where(rng.uniform(size=(n, 1)) < (0.85 if len(tips) > 8 else 0.0), near, loose)
+        reach = tree.radius * (0.22 + 0.14 * ((clumps[:, :1] * 7.3) % 1))
+        near = clumps + reach * scatter_in_ball(n, rng) * [1, 0.6, 1]
+        where = np.where(rng.uniform(size=(n, 1)) < (0.92 if len(tips) > 8 else 0.0), near, loose)
         # About 2.5 square metres of leaf in a cubic metre of crown, however many leaves make it.
         area = 2.5 * 4.2 * tree.radius**3 / max(n, 1)
         size = min(0.6, float(np.sqrt(area / 0.33)))

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 
 import hybrid_rt as hrt
+from hybrid_rt import _check
 from hybrid_rt_scenes.spec import CameraSpec, MeshSpec, SceneSpec
 
 DEFINITIONS = Path(__file__).parent / "definitions"
@@ -61,7 +62,9 @@ def read_definition(path: Path) -> SceneSpec:
 
 def _explain(file: str, error: ValidationError) -> hrt.HybridRTError:
     """Return the first of pydantic's complaints as one of ours."""
-    first = error.errors()[0]
+    # A misspelt key also leaves one missing: the misspelling is what helps.
+    found = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+    first = found[0]
     where = first["loc"]
     if first["type"] == "extra_forbidden":
         models: dict[Any, type[BaseModel]] = {"mesh": MeshSpec, "cameras": CameraSpec}
@@ -70,10 +73,15 @@ def _explain(file: str, error: ValidationError) -> hrt.HybridRTError:
         prefix = ".".join(str(part) for part in where[:-1])
         kind = f"key of {file}" + (f" [{prefix}]" if prefix else "")
         return hrt.UnknownNameError(kind, str(where[-1]), known)
-    place = ".".join(str(part) for part in where)
-    got = repr(first["input"])
-    got = got if len(got) <= 80 else got[:77] + "..."
-    return hrt.ArgumentError(f"{file}: {place}" if place else file, first["msg"], got)
+    place = ": ".join([file, ".".join(str(part) for part in where)]) if where else file
+    if first["type"] == "missing":
+        return hrt.ArgumentError(place, "a value", "none")
+    if first["type"] == "value_error":
+        inner = first["ctx"]["error"]
+        if isinstance(inner, hrt.ArgumentError):
+            return hrt.ArgumentError(f"{place}.{inner.argument}", inner.expected, inner.got)
+        return hrt.HybridRTError(f"{place}: {inner}")
+    return hrt.ArgumentError(place, first["msg"], _check.describe(first["input"]))
 
 
 def _keys(model: type[BaseModel]) -> list[str]:

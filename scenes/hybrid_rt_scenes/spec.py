@@ -58,6 +58,11 @@ class CameraSpec(_Strict):
     vfov_deg: Annotated[float, Field(gt=0, lt=180)] = 60.0
     near: Positive = 0.05
 
+    @model_validator(mode="after")
+    def _looks_somewhere(self) -> CameraSpec:
+        self.sized(16, 9)  # refuses an eye at the target and an up along the view
+        return self
+
     def sized(self, width: int, height: int) -> hrt.Camera:
         """Return the view as a camera of `width` by `height` pixels."""
         return hrt.Camera.look_at(
@@ -146,9 +151,7 @@ class SceneSpec(_Strict):
     @model_validator(mode="after")
     def _needs_fit(self) -> SceneSpec:
         if bool(self.needs) == self.builtin:
-            raise ValueError("'needs' says where mesh files come from, and only then is wanted")
-        for camera in self.cameras.values():
-            camera.sized(16, 9)  # refuses an eye at the target and an up along the view
+            raise ValueError("'needs' must say where mesh files come from, if there are any")
         return self
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import hybrid_rt as hrt
+from hybrid_rt import _check
 from hybrid_rt_scenes.builder import Builder, choose_detail
 from hybrid_rt_scenes.facades import Facade, add_bays, add_tops, awning
 from hybrid_rt_scenes.furniture import bollard, cables, chair, lamp, parasol, table, vase
@@ -54,12 +55,10 @@ def street(size: int = 2**20, seed: int = 1) -> hrt.Mesh:
     Raises
     ------
     ArgumentError
-        `size` or `seed` out of range.
+        `size` or `seed` is not an integer or out of range.
     """
-    if not SMALLEST <= size <= LARGEST:
-        raise hrt.ArgumentError("size", f"{SMALLEST} to {LARGEST} triangles", repr(size))
-    if seed < 0:
-        raise hrt.ArgumentError("seed", "an integer >= 0", repr(seed))
+    _check.integer("size", size, least=SMALLEST, most=LARGEST)
+    _check.integer("seed", seed, least=0)
     rng = np.random.default_rng(seed)
     builder = Builder()
     facades = _facades(rng)
