@@ -14,20 +14,20 @@ MISSED, GRAZED, HIT = 0, 1, 2
 
 
 @inlined
-def _largest(p):
-    return max(abs(p[0]), abs(p[1]), abs(p[2]))
+def _largest(points, i):
+    return max(abs(points[i, 0]), abs(points[i, 1]), abs(points[i, 2]))
 
 
 @inlined
-def _touch(o, d, near, far, a, b, c, ulps):
-    """Return (HIT, GRAZED or MISSED, t, tolerance of t) of a ray and a triangle."""
-    if not has_area(a, b, c):
+def _touch(i, origin, direction, near, far, vertices, ia, ib, ic, ulps):
+    """Return (HIT, GRAZED or MISSED, t, tolerance of t) of ray i and a triangle."""
+    if not has_area(vertices, ia, ib, ic):
         return MISSED, 0.0, 0.0
-    hit, distance, t = approach(o, frame(d), a, b, c)
-    slack = ulps * max(_largest(o), _largest(a), _largest(b), _largest(c))
-    x, y, z = np.float64(d[0]), np.float64(d[1]), np.float64(d[2])
-    length = math.sqrt(x * x + y * y + z * z)
-    tolerance = ulps * abs(t) + slack / length
+    hit, distance, t = approach(origin[i], frame(direction[i]), vertices, ia, ib, ic)
+    largest = max(_largest(vertices, ia), _largest(vertices, ib), _largest(vertices, ic))
+    slack = ulps * max(_largest(origin, i), largest)
+    x, y, z = np.float64(direction[i, 0]), np.float64(direction[i, 1]), np.float64(direction[i, 2])
+    tolerance = ulps * abs(t) + slack / math.sqrt(x * x + y * y + z * z)
     if hit and near <= t and t <= far:
         return HIT, t, tolerance
     if distance <= slack and near - tolerance <= t and t <= far + tolerance:
@@ -47,9 +47,8 @@ def touch(
     for i in prange(len(origin)):
         s, ti, tol = MISSED, 0.0, 0.0
         if prim_id[i] >= 0:
-            face = faces[prim_id[i]]
+            ia, ib, ic = faces[prim_id[i], 0], faces[prim_id[i], 1], faces[prim_id[i], 2]
             s, ti, tol = _touch(
-                origin[i], direction[i], t_near[i], t_far[i],
-                vertices[face[0]], vertices[face[1]], vertices[face[2]], ulps,
-            )  # fmt: skip
+                i, origin, direction, t_near[i], t_far[i], vertices, ia, ib, ic, ulps
+            )
         state[i], t[i], tolerance[i] = s, ti, tol

@@ -17,8 +17,7 @@ def _nearest_of_all(o, d, near, far, vertices, faces):
     ray = frame(d)
     best_t, best, best_u, best_v = np.inf, -1, 0.0, 0.0
     for f in range(len(faces)):
-        a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
-        t, u, v = intersect(o, ray, a, b, c)
+        t, u, v = intersect(o, ray, vertices, faces[f, 0], faces[f, 1], faces[f, 2])
         if near <= t and t <= far and t < best_t:
             best_t, best, best_u, best_v = t, f, u, v
     return best_t, best, best_u, best_v
@@ -49,8 +48,6 @@ def nearest(
                 origin[i], direction[i], t_near[i], t_far[i], vertices, faces
             )
         if best >= 0:
-            gx, gy, gz = normal(
-                vertices[faces[best, 0]], vertices[faces[best, 1]], vertices[faces[best, 2]]
-            )
+            gx, gy, gz = normal(vertices, faces[best, 0], faces[best, 1], faces[best, 2])
         t[i], prim_id[i], u[i], v[i] = best_t, best, best_u, best_v
         n_g[i, 0], n_g[i, 1], n_g[i, 2] = gx, gy, gz
