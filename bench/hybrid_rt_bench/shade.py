@@ -66,7 +66,7 @@ def shaded(gbuffer: hrt.GBuffer, rays: hrt.Rays, tracer: hrt.EmbreeTracer, sampl
         head = np.abs(np.einsum("ij,ij->i", n_ray, view)) / np.linalg.norm(view, axis=1)
         hemisphere = 0.75 + 0.25 * n_ray[:, 1]
         ambient = (open_sky * (0.56 * hemisphere + 0.18 * head))[:, None]
-        sun = (0.75 * lit)[:, None]
+        sun = (0.66 * lit)[:, None]
         tint = _tints(gbuffer.scene.object_id[gbuffer.prim_id[y, x]])
         image[y, x] = tint * (ambient * COOL + sun * WARM)
     return _srgb(image)
