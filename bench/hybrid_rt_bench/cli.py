@@ -312,11 +312,12 @@ def _render(data: RunData, *, show: bool) -> list[Path]:
 
 
 def _show(table: Table, document: Path | None = None) -> None:
-    """Print a table; one that is too wide for the terminal only if it stands nowhere else."""
+    """Print a table; a terminal too narrow for a detailed one is told where it stands."""
     rich = table.rich()
     natural = Measurement.get(out, out.options.update(width=10_000), rich).maximum
-    if document is not None and natural > out.width:
-        out.print(f"{table.title}: too wide for this terminal, see {document}", soft_wrap=True)
+    if document is not None and table.detail and natural > out.width:
+        text = f"{table.title}: too wide for this terminal, see {document}"
+        out.print(text, soft_wrap=True, highlight=False)
     else:
         out.print(rich)
     out.print()

@@ -136,6 +136,7 @@ def table_errors(run: RunData) -> Table:
             "px p50",
             "px p99",
         ],
+        detail=True,
     )
     for technique in _techniques(run):
         for scene in _scenes(run):
@@ -213,7 +214,8 @@ def table_stages(run: RunData) -> Table:
     """Return the time of every stage, for each cell."""
     short = {"embree_primary": "Embree primary", "embree": "Embree mirror", "rays": "rays"}
     names = [short.get(stage, label) for stage, label in STAGES.items()]
-    table = Table("Time of each stage, ms", ["", *names, "hybrid", "steps a ray"])
+    columns = ["", *names, "hybrid", "steps a ray"]
+    table = Table("Time of each stage, ms", columns, detail=True)
     for technique in _techniques(run):
         rows = _of(run.results, technique=technique)
         for scene in _scenes(run):
@@ -236,6 +238,7 @@ def table_embree(run: RunData) -> Table:
     table = Table(
         "The strongest Embree of each cell",
         ["", "mirror rays", "Mrays/s", "primary rays", "Mrays/s"],
+        detail=True,
     )
     rows = _of(run.results, technique=_techniques(run)[0])
     for scene in _scenes(run):
