@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table as RichTable
 
 import hybrid_rt as hrt
@@ -278,7 +279,7 @@ def render(
 def main() -> None:
     """Run the command line; errors made on purpose become one line on stderr."""
     try:
-        app()
+        app(prog_name="hybrid-rt")
     except ReportsError as error:
         _complain(error, FAILED)
     except hrt.HybridRTError as error:
@@ -311,10 +312,12 @@ def _render(data: RunData, *, show: bool) -> list[Path]:
 
 
 def _show(table: Table, document: Path | None = None) -> None:
-    """Print a table; one that is too wide for the terminal only if it stands nowhere else."""
+    """Print a table; a terminal too narrow for a detailed one is told where it stands."""
     rich = table.rich()
-    if document is not None and out.measure(rich).maximum > out.width:
-        out.print(f"{table.title}: too wide for this terminal, see {document}", soft_wrap=True)
+    natural = Measurement.get(out, out.options.update(width=10_000), rich).maximum
+    if document is not None and table.detail and natural > out.width:
+        text = f"{table.title}: too wide for this terminal, see {document}"
+        out.print(text, soft_wrap=True, highlight=False)
     else:
         out.print(rich)
     out.print()

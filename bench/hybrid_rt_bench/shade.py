@@ -66,7 +66,7 @@ def shaded(gbuffer: hrt.GBuffer, rays: hrt.Rays, tracer: hrt.EmbreeTracer, sampl
         head = np.abs(np.einsum("ij,ij->i", n_ray, view)) / np.linalg.norm(view, axis=1)
         hemisphere = 0.75 + 0.25 * n_ray[:, 1]
         ambient = (open_sky * (0.56 * hemisphere + 0.18 * head))[:, None]
-        sun = (0.75 * lit)[:, None]
+        sun = (0.66 * lit)[:, None]
         tint = _tints(gbuffer.scene.object_id[gbuffer.prim_id[y, x]])
         image[y, x] = tint * (ambient * COOL + sun * WARM)
     return _srgb(image)
@@ -80,7 +80,7 @@ def reflected_grey(rays: hrt.Rays, hits: hrt.Hits) -> F32:
     length = np.linalg.norm(rays.direction[met], axis=1)
     head = np.einsum("ij,ij->i", n, -rays.direction[met]) / np.where(length > 0, length, 1)
     sun = np.maximum(n @ SUN, 0)
-    grey[met] = 0.16 + 0.30 * (0.5 + 0.5 * n[:, 1]) + 0.26 * head + 0.24 * sun
+    grey[met] = 0.13 + 0.27 * (0.5 + 0.5 * n[:, 1]) + 0.22 * head + 0.22 * sun
     return np.clip(grey, 0, 1)
 
 

@@ -1,5 +1,6 @@
 """The command line, end to end in a subprocess and, for what ends at once, in process."""
 
+import errno
 import json
 import os
 import signal
@@ -11,7 +12,7 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from hybrid_rt_bench import cli
+from hybrid_rt_bench import cli, measure
 from hybrid_rt_bench.results import HYBRID_STAGES, STAGES
 
 TINY = ("--resolutions", "96x54", "--threads", "1")
@@ -227,3 +228,46 @@ def test_nothing_left_to_run_gives_code_3(usage_error, monkeypatch, tmp_path):
     assert "nothing left to run" in said
     assert "HYBRID_RT_DATA" in said
     assert usage_error("render", "sponza", "-o", tmp_path / "x.png", code=3)
+
+
+def test_a_cell_that_raises_costs_only_itself(monkeypatch, capsys, tmp_path):
+    measure_cell = measure.measure_cell
+
+    def breaks(loaded, camera, name, *rest):
+        if name.startswith("sphere, low"):
+            raise RuntimeError("the lens fell off")
+        return measure_cell(loaded, camera, name, *rest)
+
+    monkeypatch.setattr(measure, "measure_cell", breaks)
+    arguments = ["run", "paper", *TINY, "--scenes", "sphere", "--cameras", "front,low,above"]
+    monkeypatch.setattr(
+        sys, "argv", ["hybrid-rt", *arguments, "--rounds", "1", "--out", str(tmp_path), "--json"]
+    )
+    with pytest.raises(SystemExit) as stopped:
+        cli.main()
+    captured = capsys.readouterr()
+    assert stopped.value.code == 3
+    assert "failed: sphere, low, 96x54: RuntimeError: the lens fell off" in captured.err
+    summary = json.loads(captured.out)
+    assert [row["camera"] for row in summary["results"]] == ["front", "above"]
+
+
+def test_a_disk_that_fills_up_keeps_what_was_written(monkeypatch, capsys, tmp_path):
+    replace, renamed = os.replace, []
+
+    def full(source, target):
+        renamed.append(target)
+        if len(renamed) > 12:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", full)
+    arguments = ["run", "paper", *TINY, "--scenes", "sphere", "--rounds", "1"]
+    monkeypatch.setattr(sys, "argv", ["hybrid-rt", *arguments, "--out", str(tmp_path)])
+    with pytest.raises(SystemExit) as stopped:
+        cli.main()
+    assert stopped.value.code == 3
+    assert "No space left on device" in capsys.readouterr().err
+    folder = next(p.parent for p in tmp_path.glob("*/run.json"))
+    assert len(pd.read_parquet(folder / "results.parquet")) >= 1
+    assert json.loads((folder / "run.json").read_text())["cells"]

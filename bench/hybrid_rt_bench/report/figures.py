@@ -95,6 +95,7 @@ def time_over_resolution(run: RunData) -> Figure:
             FuncFormatter(lambda x, _, n=names: n[min(n, key=lambda k: abs(k - x))])
         )
         ax.tick_params(axis="x", rotation=30)
+        ax.set_xlim(0.7 * min(names), 1.4 * max(names))
         _plain_log(ax)
     axes[0].set_ylabel("time, ms")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)

@@ -69,7 +69,8 @@ def _figure(run: RunData, cell: dict[str, Any], technique: str, arrays: dict[str
         _fitted(reflections(arrays[f"grey_{technique}"], arrays[f"classes_{technique}"])),
     ]
     height, width = panels[0].shape[:2]
-    gap, foot = 12, 62
+    text = max(9.0, width / 72)  # points
+    gap, foot = 12, round(4.9 * text)
     figure = Figure(figsize=((2 * width + gap) / 100, (height + foot) / 100), dpi=100)
     total_w, total_h = 2 * width + gap, height + foot
     for k, panel in enumerate(panels):
@@ -78,14 +79,13 @@ def _figure(run: RunData, cell: dict[str, Any], technique: str, arrays: dict[str
         )
         ax.imshow(panel, interpolation="nearest", aspect="auto")
         ax.set_axis_off()
-    size = max(9.0, min(13.0, width / 80))
     captions = (
         f"(a) {cell['scene']}, camera {cell['camera']}, {cell['width']}×{cell['height']}",
         f"(b) mirror reflections, mode {technique!r}, alpha = {row.alpha:.3f}",
     )
     for k, caption in enumerate(captions):
         x = (width + gap) * k / total_w
-        figure.text(x + 0.004, (foot - 10) / total_h, caption, va="top", fontsize=size)
+        figure.text(x + 0.004, (foot - 0.4 * text) / total_h, caption, va="top", fontsize=text)
     right = row.resolved - row.wrong_count
     labels = (
         ("#9A9A9A", f"answered by the screen {percent(right / row.rays)}"),
@@ -96,10 +96,10 @@ def _figure(run: RunData, cell: dict[str, Any], technique: str, arrays: dict[str
     figure.legend(
         handles=[Patch(facecolor=c, edgecolor="#777777", lw=0.5, label=t) for c, t in labels],
         loc="lower left",
-        bbox_to_anchor=((width + gap) / total_w - 0.004, 0.0),
+        bbox_to_anchor=((width + gap) / total_w - 0.002, 0.0),
         ncols=4,
         frameon=False,
-        fontsize=size - 1,
+        fontsize=0.92 * text,
         handlelength=1.2,
         columnspacing=1.2,
         borderpad=0.3,

@@ -22,12 +22,15 @@ class Table:
         A row of one cell is a heading for the rows that follow.
     notes : list of str
         Sentences printed beneath.
+    detail : bool
+        Whether a terminal that is too narrow may do without it.
     """
 
     title: str
     columns: list[str]
     rows: list[list[str]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    detail: bool = False
 
     def markdown(self) -> str:
         """Return the table as GitHub-flavoured markdown."""
