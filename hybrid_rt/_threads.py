@@ -15,21 +15,26 @@ def available() -> int:
     return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 
 
-@contextmanager
-def limited(threads: int | None) -> Iterator[int]:
-    """Run the kernels of a ``with`` block on `threads` threads (None: as Numba is set).
+def count(threads: int | None) -> int:
+    """Return how many threads `threads` stands for; None is as many as Numba is set to.
 
     Raises
     ------
     ArgumentError
         Fewer than one thread, or more than there are.
     """
-    before = int(numba.get_num_threads())
     if threads is None:
-        yield before
-        return
-    numba.set_num_threads(_check.integer("threads", threads, least=1, most=available()))
+        return int(numba.get_num_threads())
+    return _check.integer("threads", threads, least=1, most=available())
+
+
+@contextmanager
+def limited(threads: int | None) -> Iterator[int]:
+    """Run the kernels of a ``with`` block on `threads` threads, as `count` reads it."""
+    before = int(numba.get_num_threads())
+    workers = count(threads)
+    numba.set_num_threads(workers)
     try:
-        yield threads
+        yield workers
     finally:
         numba.set_num_threads(before)

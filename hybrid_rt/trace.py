@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid_rt import _check
+from hybrid_rt import _check, _threads
 from hybrid_rt._embreex import EmbreexScene
 from hybrid_rt.embree import QUALITIES, WIDTHS, NativeScene, embree_info, packet_available
 from hybrid_rt.errors import ArgumentError
@@ -95,7 +92,7 @@ class EmbreeTracer:
                 f"a largest coordinate from {SMALLEST_SCENE:g} to {LARGEST_SCENE:g}",
                 f"{largest:g}",
             )
-        self._bvh = _Bvh(scene, _thread_count(threads), bool(robust), build_quality)
+        self._bvh = _Bvh(scene, _threads.count(threads), bool(robust), build_quality)
         self._set_path(path, width, coherent, threads)
 
     def with_path(
@@ -122,7 +119,7 @@ class EmbreeTracer:
         return other
 
     def _set_path(self, path: str, width: int, coherent: bool, threads: int | None) -> None:
-        _thread_count(threads)
+        _threads.count(threads)
         self._threads = threads
         self._path = str(_check.choice("path", path, PATHS))
         self._width = int(_check.choice("width", width, WIDTHS))
@@ -157,7 +154,7 @@ class EmbreeTracer:
     @property
     def threads(self) -> int:
         """Threads that the next call will use."""
-        return _thread_count(self._threads)
+        return _threads.count(self._threads)
 
     @property
     def build_seconds(self) -> float:
@@ -184,7 +181,7 @@ class EmbreeTracer:
         rays = _checked(rays)
         if self._path == "run":
             return self._bvh.embreex.intersect(rays, self.threads)
-        with _numba_threads(self.threads) as workers:
+        with _threads.limited(self.threads) as workers:
             return self._bvh.native.intersect(
                 rays, width=self._width, coherent=self._coherent, workers=workers
             )
@@ -194,7 +191,7 @@ class EmbreeTracer:
         rays = _checked(rays)
         if self._path == "run":
             return self._bvh.embreex.occluded(rays, self.threads)
-        with _numba_threads(self.threads) as workers:
+        with _threads.limited(self.threads) as workers:
             return self._bvh.native.occluded(
                 rays, width=self._width, coherent=self._coherent, workers=workers
             )
@@ -219,14 +216,14 @@ class BruteForceTracer:
 
     def __init__(self, scene: Scene, *, threads: int | None = None) -> None:
         _check.instance("scene", scene, Scene)
-        _thread_count(threads)
+        _threads.count(threads)
         self._scene, self._threads = scene, threads
         self._vertices, self._faces = _kernel_array(scene.vertices), _kernel_array(scene.faces)
 
     @property
     def threads(self) -> int:
         """Threads that the next call will use."""
-        return _thread_count(self._threads)
+        return _threads.count(self._threads)
 
     @property
     def scene(self) -> Scene:
@@ -237,7 +234,7 @@ class BruteForceTracer:
         """Return the nearest hit of each ray."""
         rays = _checked(rays)
         hits = Hits.empty(len(rays))
-        with _numba_threads(self.threads):
+        with _threads.limited(self.threads):
             kernels.nearest(
                 rays.origin, rays.direction, rays.t_near, rays.t_far,
                 self._vertices, self._faces,
@@ -295,21 +292,3 @@ def _checked(rays: Rays) -> Rays:
 def _kernel_array(value: NDArray[Any]) -> NDArray[Any]:
     # A read-only array has a type of its own in Numba and would compile every kernel again.
     return np.require(value, requirements=["C", "W"])
-
-
-def _thread_count(threads: int | None) -> int:
-    if threads is None:
-        return int(numba.get_num_threads())
-    most = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-    return _check.integer("threads", threads, least=1, most=most)
-
-
-@contextmanager
-def _numba_threads(count: int) -> Iterator[int]:
-    """Let Numba use `count` threads, and give its setting back afterwards."""
-    before = numba.get_num_threads()
-    numba.set_num_threads(count)
-    try:
-        yield count
-    finally:
-        numba.set_num_threads(before)

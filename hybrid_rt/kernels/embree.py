@@ -20,6 +20,7 @@ from numba import prange, types
 from numba.extending import intrinsic
 
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+from hybrid_rt.kernels._queue import fetch_add
 
 SCALE = 21
 FIELDS = 22
@@ -51,17 +52,6 @@ def _generator_of(count):
         return context.get_dummy_value()
 
     return generate
-
-
-@intrinsic
-def _fetch_add(typingctx, address, value):
-    """Add `value` to the int64 at `address` in one atomic step and return what was there before."""
-
-    def generate(context, builder, signature, arguments):
-        pointer = builder.inttoptr(arguments[0], ir.IntType(64).as_pointer())
-        return builder.atomic_rmw("add", pointer, arguments[1], "monotonic")
-
-    return types.int64(types.int64, types.int64), generate
 
 
 @inlined
@@ -183,13 +173,13 @@ def intersect(
         packet = _aligned(FIELDS * width)
         words = packet.view(np.int32)
         valid = _aligned(width).view(np.int32)
-        start = _fetch_add(taken.ctypes.data, CHUNK)
+        start = fetch_add(taken.ctypes.data, CHUNK)
         while start < len(origin):
             for first in range(start, min(start + CHUNK, len(origin)), width):
                 if _load(first, width, origin, direction, t_near, t_far, packet, words, valid):
                     _query(function, scene, arguments, width, packet, valid)
                 _store(first, width, packet, words, t, prim_id, u, v, n_g)
-            start = _fetch_add(taken.ctypes.data, CHUNK)
+            start = fetch_add(taken.ctypes.data, CHUNK)
 
 
 @parallel_kernel
@@ -202,7 +192,7 @@ def occluded(
         packet = _aligned(FIELDS * width)
         words = packet.view(np.int32)
         valid = _aligned(width).view(np.int32)
-        start = _fetch_add(taken.ctypes.data, CHUNK)
+        start = fetch_add(taken.ctypes.data, CHUNK)
         while start < len(origin):
             for first in range(start, min(start + CHUNK, len(origin)), width):
                 if _load(first, width, origin, direction, t_near, t_far, packet, words, valid):
@@ -210,7 +200,7 @@ def occluded(
                 for k in range(min(width, len(origin) - first)):
                     # Embree writes tfar = -inf for an occluded ray and leaves a masked lane alone.
                     hit[first + k] = packet[8 * width + k] == -np.inf
-            start = _fetch_add(taken.ctypes.data, CHUNK)
+            start = fetch_add(taken.ctypes.data, CHUNK)
 
 
 @kernel
