@@ -245,11 +245,29 @@ def add_tops(builder: Builder, facades: list[Facade], budget: float) -> None:
             )
             for x in (0.0, w)
         ]
-        walls = [quad([x, 0, 0], [0, 0, -7.6], [0, h, 0]) for x in (0.0, w)]
+        # Where another front stands in the plane of a side wall, only what rises above it is built.
+        low = [_front_beside(facade, x, facades) for x in (0.0, w)]
+        walls = [
+            quad([x, y, 0], [0, 0, -7.6], [0, h - y, 0])
+            for x, y in zip((0.0, w), low, strict=True)
+            if y < h
+        ]
         builder.add(facade.put(join([slope, flat, *sides, *walls])))
     each = budget / len(facades)
     for facade in facades:
         builder.add(facade.put(_trim(facade, each)))
+
+
+def _front_beside(facade: Facade, x: float, facades: list[Facade]) -> float:
+    """Return the height of the front that covers the side wall of `facade` at x, or 0."""
+    inside = facade.put(Part(np.array([[x, 0.0, -1.0]]), np.empty((0, 3), np.int64))).vertices[0]
+    for other in facades:
+        away = inside - np.array(other.corner)
+        c, s = np.cos(other.yaw), np.sin(other.yaw)
+        along, out = c * away[0] - s * away[2], s * away[0] + c * away[2]
+        if abs(out) < 1e-6 and 0 <= along <= other.width:
+            return other.height
+    return 0.0
 
 
 def _trim(facade: Facade, budget: float) -> Part:

@@ -198,13 +198,14 @@ def leaves(centres: F64, size: ArrayLike, rng: np.random.Generator) -> Part:
 
 
 def cobbles(centres: F64, half: ArrayLike, height: ArrayLike, yaw: ArrayLike, rounds: int) -> Part:
-    """Return domed paving stones, `rounds` by `rounds` cells each, their rims sunk to `centres`.
+    """Return domed paving stones, `rounds` by `rounds` cells each, standing on `centres`.
 
+    Their rims are sunk below, so that no flat corner of a stone lies in the plane of the ground.
     2 rounds**2 triangles each; `half` is (n, 2) half widths along x and z.
     """
     u = np.linspace(-1, 1, rounds + 1)
     x, z = np.meshgrid(u, u)
-    dome = ((1 - x**2) * (1 - z**2)) ** 0.25
+    dome = 1.1 * ((1 - x**2) * (1 - z**2)) ** 0.25 - 0.1
     # Outer points in to a rounded square, so that joints stay open.
     shrink = 1 - 0.12 * x**2 * z**2
     template = surface(np.stack([x * shrink, dome, z * shrink], axis=-1))
