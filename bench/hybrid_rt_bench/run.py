@@ -11,7 +11,7 @@ from typing import Any
 import numba
 
 import hybrid_rt as hrt
-from hybrid_rt_bench import env, measure, stats
+from hybrid_rt_bench import env, measure, memory, stats
 from hybrid_rt_bench.plan import Plan, PlannedScene, make_plan
 from hybrid_rt_bench.progress import Reporter
 from hybrid_rt_bench.results import ReportsError, RunWriter, create_run
@@ -95,11 +95,16 @@ def run_experiment(
         },
     )
     numba.set_num_threads(threads)
+    kept = memory.keep_freed()
     try:
         reporter.doing("compiling")
         load = env.load_average()  # before this program adds to it
         writer.meta["compile_seconds"] = measure.compile_seconds(experiment, techniques, threads)
-        environment = {**env.describe(threads), "load_average": load}
+        environment = {
+            **env.describe(threads),
+            "load_average": load,
+            "keeps_freed_memory": kept,
+        }
         writer.meta["environment"] = environment
         for problem in env.problems(environment):
             _warn(writer, reporter, problem)
