@@ -85,7 +85,7 @@ def test_every_stage_of_every_round_is_kept(finished):
     counts = samples.groupby(["camera", "stage", "phase"]).size().unstack()
     assert set(samples.stage) == set(STAGES)
     assert (counts["measured"] == 2).all()
-    assert (counts["warmup"] == 1).all()
+    assert (counts["warmup"] == 2).all()
     assert (samples.seconds > 0).all()
     mine = samples.technique == "paper"
     assert set(samples[mine].stage) == set(HYBRID_STAGES)
