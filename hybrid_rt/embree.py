@@ -156,14 +156,7 @@ class NativeScene:
 
     def intersect(self, rays: Rays, *, width: int, coherent: bool, workers: int) -> Hits:
         """Return the nearest hits; `workers` is the number of Numba threads in use."""
-        n = len(rays)
-        hits = Hits(
-            np.empty(n, np.float32),
-            np.empty(n, np.int32),
-            np.empty(n, np.float32),
-            np.empty(n, np.float32),
-            np.empty((n, 3), np.float32),
-        )
+        hits = Hits.unfilled(len(rays))
         arguments = _query_arguments(coherent)
         kernels.intersect(
             _address(f"rtcIntersect{width}"), self._scene, arguments.ctypes.data, width, workers,

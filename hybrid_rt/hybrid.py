@@ -70,14 +70,7 @@ def trace_hybrid(
         clock.append(time.perf_counter())
         traced = tracer.intersect(rest)
         clock.append(time.perf_counter())
-        n = len(rays)
-        hits = Hits(
-            np.empty(n, np.float32),
-            np.empty(n, np.int32),
-            np.empty(n, np.float32),
-            np.empty(n, np.float32),
-            np.empty((n, 3), np.float32),
-        )
+        hits = Hits.unfilled(len(rays))
         kernels.merge(
             resolved,
             starts,

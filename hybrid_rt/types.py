@@ -443,6 +443,17 @@ class Hits:
             np.zeros((n, 3), np.float32),
         )
 
+    @classmethod
+    def unfilled(cls, n: int) -> Hits:
+        """Return room for `n` hits, with nothing in it yet, for code that writes every row."""
+        return cls(
+            np.empty(n, np.float32),
+            np.empty(n, np.int32),
+            np.empty(n, np.float32),
+            np.empty(n, np.float32),
+            np.empty((n, 3), np.float32),
+        )
+
     def __len__(self) -> int:
         return len(self.t)
 
