@@ -12,7 +12,7 @@ from hybrid_rt.hybrid import trace_hybrid
 from hybrid_rt.io import read_mesh
 from hybrid_rt.march import march
 from hybrid_rt.metrics import Judged, Rate, Verdict, alpha, by_status, judge, rates
-from hybrid_rt.modes import Mode, Paper
+from hybrid_rt.modes import Certified, Mode, Paper
 from hybrid_rt.pyramid import build_depth_pyramid
 from hybrid_rt.raster import rasterize
 from hybrid_rt.rays import mirror_rays
@@ -26,6 +26,7 @@ from hybrid_rt.types import (
     HybridResult,
     Marched,
     MarchStatus,
+    PrimitiveLists,
     Mesh,
     Rays,
     Scene,
@@ -37,6 +38,7 @@ __all__ = [
     "ArgumentError",
     "BruteForceTracer",
     "Camera",
+    "Certified",
     "DepthPyramid",
     "EmbreeError",
     "EmbreeTracer",
@@ -51,6 +53,7 @@ __all__ = [
     "MeshFileError",
     "Mode",
     "Paper",
+    "PrimitiveLists",
     "Rate",
     "Rays",
     "Scene",
