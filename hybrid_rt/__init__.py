@@ -26,8 +26,8 @@ from hybrid_rt.types import (
     HybridResult,
     Marched,
     MarchStatus,
-    PrimitiveLists,
     Mesh,
+    PrimitiveLists,
     Rays,
     Scene,
 )

@@ -50,7 +50,9 @@ def primitive_lists(
                 size = -(-size // 2)
                 continue
             tile_start = np.empty(tiles + 1, np.int32)
-            prefix_sums(np.zeros(chunks, np.int32), cursors, np.empty(chunks + 1, np.int32), tile_start)
+            prefix_sums(
+                np.zeros(chunks, np.int32), cursors, np.empty(chunks + 1, np.int32), tile_start
+            )
             bins = np.empty(entries, np.int32)
             if entries:
                 kernels.bin_faces(*place, cursors, bins)

@@ -67,7 +67,5 @@ def march(
     if isinstance(chosen, Certified):
         return certified.march(rays, gbuffer, pyramid, chosen, any_hit, threads)
     if pyramid.conservative:
-        raise ArgumentError(
-            "pyramid", "one of the depths at pixel centres", "a conservative one"
-        )
+        raise ArgumentError("pyramid", "one of the depths at pixel centres", "a conservative one")
     return paper.march(rays, gbuffer, pyramid, chosen, threads)

@@ -66,7 +66,7 @@ BEYOND = 1.0 + 2.0**-20
 """A ray's end is put off by this, relative, where it must not come too early."""
 
 SHORTEST = 1e-300
-"""A ray that ends where it starts is walked over this much of s, so that its one point is tested."""
+"""A ray that ends where it starts is walked over this much of s: its one point is tested."""
 
 T_MISS, T_HIT, T_UNDECIDED = 0, 1, 2
 
@@ -219,7 +219,7 @@ def walk(
                 if prim < 0 or nearest[cy, cx, k] < lowest:
                     full = False
                     break
-                if prim == m0 or prim == m1 or prim == m2 or prim == m3:
+                if prim in (m0, m1, m2, m3):
                     continue
                 if tests == max_tests:
                     return EXHAUSTED, -1, -1, -1, math.inf, s / scale, steps, tests
@@ -295,7 +295,7 @@ def march_chunk(
             last_t = min(stop, leaves_bounds(origin[i], direction[i], low, high))
             if start <= last_t < math.inf:
                 s_last = (last_t - start) / (z + (last_t - start) * gz)
-                if 0.0 <= s_last and s_last * BEYOND < s_end:
+                if s_last >= 0.0 and s_last * BEYOND < s_end:
                     how, s_end = MISS, max(s_last, SHORTEST)
             if last_t < start:
                 how = MISS
@@ -312,7 +312,7 @@ def march_chunk(
                 )  # fmt: skip
         tests[0] += tested
         status[i] = how
-        resolved[i] = how == HIT or how == MISS
+        resolved[i] = how in (HIT, MISS)
         pixel[i, 0] = hit_x
         pixel[i, 1] = hit_y
         prim[i] = found
@@ -335,7 +335,7 @@ def march(
     max_steps, max_tests, any_hit,
     status, resolved, pixel, prim, t, t_free, steps, steps_by_level, tests,
 ):  # fmt: skip
-    """March rays (N, 3) through lists; outputs (N,), steps_by_level (workers, L), tests (workers, 1)."""
+    """March rays (N, 3); outputs (N,), steps_by_level (workers, L), tests (workers, 1)."""
     n = origin.shape[0]
     taken = np.zeros(1, np.int64)
     for worker in prange(workers):

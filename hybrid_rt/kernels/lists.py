@@ -38,7 +38,7 @@ TILE = 1 << TILE_BITS
 SLACK = 2.0**-48
 """Relative error of the sums above, 32 e."""
 NEAR_SLACK = 2.0**-20
-"""By this much, relative, the near plane is moved to the eye: a ray may end a rounding beyond it."""
+"""The near plane is moved to the eye by this, relative: a ray may end a rounding beyond it."""
 EDGE_ON = 1024.0
 """A plane whose distance from the eye is not certain to one part in a thousand has no slope."""
 CAP = 1.01
@@ -46,7 +46,7 @@ CAP = 1.01
 TINY = np.float32(1e-37)
 """A bound that is not zero is at least this, where float32 still has all its digits."""
 
-COVER, ALL, NOTHING = 0, 1, 2
+COVER, ALL = 0, 1
 
 # Scratch of one triangle's set-up: three edges (A, B, C, slack), the plane's numerator (A, B, C,
 # slack), its denominator, the nearest depth of the vertices.
@@ -74,6 +74,16 @@ def _edge(vertices, i, j):
 
 
 @inlined
+def _equal(vertices, i, j):
+    """Are two vertices in the same place."""
+    return (
+        vertices[i, 0] == vertices[j, 0]
+        and vertices[i, 1] == vertices[j, 1]
+        and vertices[i, 2] == vertices[j, 2]
+    )
+
+
+@inlined
 def _row(m, k, x, y, z):
     """Return (q_k, Q_k): row k of M times a vector, and the sum of its terms' sizes."""
     a, b, c = m[k, 0] * x, m[k, 1] * y, m[k, 2] * z
@@ -84,8 +94,15 @@ def _row(m, k, x, y, z):
 def face_box(vertices, faces, face, eye, m, near, width, height, margin):
     """Return (any, i0, j0, i1, j1): the grown pixels that the face may touch.
 
-    A face that crosses the near plane gets the whole screen, unless it lies on one side of it.
+    A face that crosses the near plane gets the whole screen, unless it lies beside it. One with two
+    equal corners is a line or a point and is never hit.
     """
+    if (
+        _equal(vertices, faces[face, 0], faces[face, 1])
+        or _equal(vertices, faces[face, 1], faces[face, 2])
+        or _equal(vertices, faces[face, 2], faces[face, 0])
+    ):
+        return False, 0, 0, 0, 0
     low_x = np.inf
     low_y = np.inf
     high_x = -np.inf
@@ -158,7 +175,7 @@ def bin_faces(
 
 @kernel
 def set_up(vertices, faces, face, eye, m, frame, near, width, height, out):
-    """Fill `out` (SETUP,) float64 with a face's edges and plane; return COVER, ALL or NOTHING.
+    """Fill `out` (SETUP,) float64 with a face's edges and plane; return COVER or ALL.
 
     ALL: the face is seen edge-on, so only its box and its nearest depth bound it.
     """
@@ -270,9 +287,7 @@ def draw(face, kind, setup, left, top, i0, j0, i1, j1, half, cx, cy, ids, bounds
                 if high <= 0.0 or middle - spread > CAP * setup[DENOMINATOR]:
                     continue  # beyond infinity, or nearer than the near plane, all over the square
                 bound = min(bound, high)
-            insert(
-                face, round_up(bound), ids, bounds, rest, (j - top) * TILE + (i - left)
-            )
+            insert(face, round_up(bound), ids, bounds, rest, (j - top) * TILE + (i - left))
 
 
 @parallel_kernel
@@ -309,7 +324,7 @@ def fill_lists(
                         bounds[at, k] = nearest[j, i, k]
             for entry in range(tile_start[tile], tile_start[tile + 1]):
                 face = bins[entry]
-                some, i0, j0, i1, j1 = face_box(
+                _, i0, j0, i1, j1 = face_box(
                     vertices, faces, face, eye, m, near, width, height, margin
                 )
                 kind = set_up(vertices, faces, face, eye, m, frame, near, width, height, setup)
