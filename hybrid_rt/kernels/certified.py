@@ -169,6 +169,18 @@ def slope_axis(delta):
 
 
 @inlined
+def start_depth(depth, dz, s_end):
+    """Return the depth at s = 0, in float32 and lowered by what `depth_at` may be too high."""
+    return F(depth - DEPTH_ULPS * U * max(depth, depth + dz * s_end))
+
+
+@inlined
+def depth_at(z0, sz, s):
+    """Return a depth, in float32, that the ray at s is in front of."""
+    return z0 + sz * s
+
+
+@inlined
 def walk(
     i, origin, direction, ray, t_near, t_far, status, x, y, depth, dx, dy, dz, s_end, z, gz,
     prim_id, nearest, rest, cells, offsets, widths, vertices, faces, max_steps, max_tests, any_hit,
@@ -183,7 +195,7 @@ def walk(
     sy, inv_y, bias_y, step_y, far_y = slope_axis(dy / scale)
     sz = F(dz / scale)
     x0, y0 = F(x), F(y)
-    z0 = F(depth - DEPTH_ULPS * U * max(depth, depth + dz * s_end))
+    z0 = start_depth(depth, dz, s_end)
     o = origin[i]
 
     best = -1
@@ -208,7 +220,7 @@ def walk(
         steps += 1
         steps_by_level[level] += 1
         near = cells[offsets[level] + ly * widths[level] + lx]
-        lowest = z0 + sz * (s_exit if sz < F0 else s)
+        lowest = depth_at(z0, sz, s_exit if sz < F0 else s)
         if near > F0 and not lowest > near:
             if level > 0:
                 level -= 1
@@ -241,7 +253,7 @@ def walk(
                 if at_hit >= 0.0:  # negative: behind the eye
                     end = min(end, F(at_hit * scale * BEYOND))
                     s_exit = max(min(leave, end), s)
-                    lowest = z0 + sz * (s_exit if sz < F0 else s)
+                    lowest = depth_at(z0, sz, s_exit if sz < F0 else s)
             if full and not lowest > rest[cy, cx]:
                 return HIDDEN, -1, -1, -1, math.inf, s / scale, steps, tests
         s = s_exit
