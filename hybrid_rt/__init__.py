@@ -15,7 +15,14 @@ from hybrid_rt.metrics import Judged, Rate, Verdict, alpha, by_status, judge, ra
 from hybrid_rt.modes import Mode, Paper
 from hybrid_rt.pyramid import build_depth_pyramid
 from hybrid_rt.raster import rasterize
-from hybrid_rt.rays import mirror_rays
+from hybrid_rt.lights import AreaLight, DirectionalLight, Light, PointLight
+from hybrid_rt.rays import (
+    ambient_occlusion_rays,
+    diffuse_rays,
+    glossy_rays,
+    mirror_rays,
+    shadow_rays,
+)
 from hybrid_rt.scene import load_scene
 from hybrid_rt.trace import BruteForceTracer, EmbreeTracer, embree_info, packet_available
 from hybrid_rt.types import (
