@@ -8,14 +8,14 @@ from hybrid_rt.errors import (
     MeshFileError,
     UnknownNameError,
 )
-from hybrid_rt.hybrid import trace_hybrid
+from hybrid_rt.hybrid import occluded_hybrid, trace_hybrid
 from hybrid_rt.io import read_mesh
+from hybrid_rt.lights import AreaLight, DirectionalLight, Light, PointLight
 from hybrid_rt.march import march
 from hybrid_rt.metrics import Judged, Rate, Verdict, alpha, by_status, judge, rates
 from hybrid_rt.modes import Mode, Paper
 from hybrid_rt.pyramid import build_depth_pyramid
 from hybrid_rt.raster import rasterize
-from hybrid_rt.lights import AreaLight, DirectionalLight, Light, PointLight
 from hybrid_rt.rays import (
     ambient_occlusion_rays,
     diffuse_rays,
@@ -34,6 +34,7 @@ from hybrid_rt.types import (
     Marched,
     MarchStatus,
     Mesh,
+    OcclusionResult,
     Rays,
     Scene,
 )
@@ -41,10 +42,12 @@ from hybrid_rt.types import (
 __version__ = "0.1.0"
 
 __all__ = [
+    "AreaLight",
     "ArgumentError",
     "BruteForceTracer",
     "Camera",
     "DepthPyramid",
+    "DirectionalLight",
     "EmbreeError",
     "EmbreeTracer",
     "GBuffer",
@@ -52,30 +55,38 @@ __all__ = [
     "HybridRTError",
     "HybridResult",
     "Judged",
+    "Light",
     "MarchStatus",
     "Marched",
     "Mesh",
     "MeshFileError",
     "Mode",
+    "OcclusionResult",
     "Paper",
+    "PointLight",
     "Rate",
     "Rays",
     "Scene",
     "UnknownNameError",
     "Verdict",
     "alpha",
+    "ambient_occlusion_rays",
     "build_depth_pyramid",
     "by_status",
+    "diffuse_rays",
     "embree_info",
+    "glossy_rays",
     "judge",
     "load_scene",
     "march",
     "mirror_rays",
+    "occluded_hybrid",
     "packet_available",
     "project",
     "rasterize",
     "rates",
     "read_mesh",
+    "shadow_rays",
     "trace_hybrid",
     "unproject",
 ]
