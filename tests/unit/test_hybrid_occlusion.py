@@ -52,9 +52,9 @@ def test_resolved_rays_from_the_march_the_others_from_the_tracer(room, make):
     for name in ("status", "resolved", "pixel"):
         np.testing.assert_array_equal(getattr(result, name), getattr(marched, name))
     np.testing.assert_array_equal(result.occluded[resolved], marched.prim_id[resolved] >= 0)
-    free = tracer.occluded(rays.take(~resolved))
-    assert 0 < free.sum() < len(free)
-    np.testing.assert_array_equal(result.occluded[~resolved], free)
+    traced = tracer.occluded(rays.take(~resolved))
+    assert 0 < traced.sum() < len(traced)
+    np.testing.assert_array_equal(result.occluded[~resolved], traced)
     assert set(result.timings) == {"march", "compaction", "fallback", "merge"}
 
 
