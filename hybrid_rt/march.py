@@ -56,6 +56,7 @@ def march(
     _check.instance("rays", rays, Rays)
     _check.instance("gbuffer", gbuffer, GBuffer)
     _check.instance("pyramid", pyramid, DepthPyramid)
+    _check.choice("any_hit", any_hit, (True, False))
     chosen = modes.named(mode)
     height, width = gbuffer.depth.shape
     if (pyramid.heights[0], pyramid.widths[0]) != (height, width):
