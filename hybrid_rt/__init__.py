@@ -13,7 +13,7 @@ from hybrid_rt.io import read_mesh
 from hybrid_rt.lights import AreaLight, DirectionalLight, Light, PointLight
 from hybrid_rt.march import march
 from hybrid_rt.metrics import Judged, Rate, Verdict, alpha, by_status, judge, rates
-from hybrid_rt.modes import Mode, Paper
+from hybrid_rt.modes import Certified, Mode, Paper
 from hybrid_rt.pyramid import build_depth_pyramid
 from hybrid_rt.raster import rasterize
 from hybrid_rt.rays import (
@@ -35,6 +35,7 @@ from hybrid_rt.types import (
     MarchStatus,
     Mesh,
     OcclusionResult,
+    PrimitiveLists,
     Rays,
     Scene,
 )
@@ -46,6 +47,7 @@ __all__ = [
     "ArgumentError",
     "BruteForceTracer",
     "Camera",
+    "Certified",
     "DepthPyramid",
     "DirectionalLight",
     "EmbreeError",
@@ -64,6 +66,7 @@ __all__ = [
     "OcclusionResult",
     "Paper",
     "PointLight",
+    "PrimitiveLists",
     "Rate",
     "Rays",
     "Scene",

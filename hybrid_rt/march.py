@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from hybrid_rt import _check, modes, paper
+from hybrid_rt import _check, certified, modes, paper
 from hybrid_rt.errors import ArgumentError
-from hybrid_rt.modes import Mode
+from hybrid_rt.modes import Certified, Mode
 from hybrid_rt.types import DepthPyramid, GBuffer, Marched, Rays
 
 
@@ -27,7 +27,7 @@ def march(
     gbuffer : GBuffer
     pyramid : DepthPyramid
         Of `gbuffer`.
-    mode : {"paper"} or a mode object
+    mode : {"paper", "certified"} or a mode object
         The technique; see `hybrid_rt.modes`. A name stands for its default parameters.
     any_hit : bool
         Whether any hit answers a ray and not only its nearest. For "paper", whose first hit is its
@@ -65,4 +65,8 @@ def march(
             f"the pyramid of the G-buffer, {width} by {height} pixels at level 0",
             f"one of {pyramid.widths[0]} by {pyramid.heights[0]}",
         )
+    if isinstance(chosen, Certified):
+        return certified.march(rays, gbuffer, pyramid, chosen, any_hit, threads)
+    if pyramid.conservative:
+        raise ArgumentError("pyramid", "one of the depths at pixel centres", "a conservative one")
     return paper.march(rays, gbuffer, pyramid, chosen, threads)
