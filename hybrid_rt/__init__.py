@@ -17,6 +17,7 @@ from hybrid_rt.raster import rasterize
 from hybrid_rt.rays import mirror_rays
 from hybrid_rt.scene import load_scene
 from hybrid_rt.trace import BruteForceTracer, EmbreeTracer, embree_info, packet_available
+from hybrid_rt.truth import Nearest, Truth
 from hybrid_rt.types import (
     Camera,
     DepthPyramid,
@@ -48,9 +49,11 @@ __all__ = [
     "Marched",
     "Mesh",
     "MeshFileError",
+    "Nearest",
     "Rate",
     "Rays",
     "Scene",
+    "Truth",
     "UnknownNameError",
     "Verdict",
     "alpha",
