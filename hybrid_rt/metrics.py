@@ -222,23 +222,28 @@ def _hold(
     Return which claims and which references are right, and the true t.
     """
     claim_right, reference_right = np.ones(len(rays), np.bool_), np.ones(len(rays), np.bool_)
-    state, t_true = truth.touch(rays, claim)
-    t_true = np.where(state == MISSED, ref_t, t_true)
+    state, t_claim = truth.touch(rays, claim)
+    t_true = np.where(state == MISSED, ref_t, t_claim)
     at = np.flatnonzero(look)
     if len(at) == 0:
         return claim_right, reference_right, t_true
-    rays = rays.take(at)
+    rays, claim, ref, t_claim = rays.take(at), claim[at], ref[at], t_claim[at]
+    other = claim != ref
+    t_ref = t_claim.copy()
+    t_ref[other] = truth.touch(rays.take(other), ref[other])[1]
     nearest = truth.nearest(rays)
     slack = truth.tolerance(rays, nearest.prim_id, nearest.t)
-    touched = []
-    for answer, right in ((claim[at], claim_right), (ref[at], reference_right)):
-        state, t = truth.touch(rays, answer)
+    nothing = nearest.prim_id < 0
+    # The t of what is missed is NaN, and no NaN is small enough to be right.
+    for answer, t, right in ((claim, t_claim, claim_right), (ref, t_ref, reference_right)):
         tie = np.maximum(slack, truth.tolerance(rays, answer, t))
-        right[at] = np.where(answer < 0, nearest.prim_id < 0, t <= nearest.t + tie)
-        touched.append(np.where(right[at] & (state != MISSED), t, np.inf))
-    # An answer that is right by a graze alone is the only truth there is to measure against.
-    behind = np.minimum(nearest.t, touched[1])
-    t_true[at] = np.where(np.isfinite(touched[0]), touched[0], behind)
+        right[at] = np.where(answer < 0, nothing, t <= nearest.t + tie)
+    # A claim that is right is met at its own t. A reference that is right by a graze alone is all
+    # the truth that there is to measure a wrong claim against.
+    t_reference = np.where(reference_right[at] & (ref >= 0), t_ref, np.inf)
+    t_true[at] = np.where(
+        claim_right[at] & (claim >= 0), t_claim, np.minimum(nearest.t, t_reference)
+    )
     return claim_right, reference_right, t_true
 
 

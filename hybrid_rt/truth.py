@@ -167,7 +167,7 @@ class Truth:
                 self._vertices, self._faces, area, hit, t, error, grazed,
             )  # fmt: skip
         for i in np.flatnonzero(hit == kernels.UNSURE):
-            exact = self._exact(rays, int(i), int(named[i]))
+            exact = _exact.intersect(*_exact_ray(rays, int(i)), self._corners(int(named[i])))
             hit[i] = kernels.NO if exact is None else kernels.YES
             t[i] = 0.0 if exact is None else float(exact)
         is_hit = hit == kernels.YES
@@ -232,8 +232,9 @@ class Truth:
             room = count
         best: tuple[Fraction, int] | None = None
         grazed = math.inf
+        ray = _exact_ray(rays, i)
         for prim, graze in zip(met[:count].tolist(), met_graze[:count].tolist(), strict=True):
-            t = self._exact(rays, i, prim)
+            t = _exact.intersect(*ray, self._corners(prim))
             if t is not None:
                 best = (t, prim) if best is None else min(best, (t, prim))
             elif graze < grazed:
@@ -247,15 +248,10 @@ class Truth:
         a, b, c = (_exact.vector(p) for p in self._vertices[self._faces[prim]])
         return a, b, c
 
-    def _exact(self, rays: Rays, i: int, prim: int) -> Fraction | None:
-        """Return where ray i hits a triangle, None where it does not."""
-        return _exact.intersect(
-            _exact.vector(rays.origin[i]),
-            _exact.vector(rays.direction[i]),
-            float(rays.t_near[i]),
-            float(rays.t_far[i]),
-            self._corners(prim),
-        )
+
+def _exact_ray(rays: Rays, i: int) -> tuple[_exact.Vector, _exact.Vector, float, float]:
+    origin, direction = _exact.vector(rays.origin[i]), _exact.vector(rays.direction[i])
+    return origin, direction, float(rays.t_near[i]), float(rays.t_far[i])
 
 
 def _checked(rays: Rays) -> Rays:
