@@ -12,6 +12,7 @@ from hybrid_rt.hybrid import trace_hybrid
 from hybrid_rt.io import read_mesh
 from hybrid_rt.march import march
 from hybrid_rt.metrics import Judged, Rate, Verdict, alpha, by_status, judge, rates
+from hybrid_rt.modes import Mode, Paper
 from hybrid_rt.pyramid import build_depth_pyramid
 from hybrid_rt.raster import rasterize
 from hybrid_rt.rays import mirror_rays
@@ -49,7 +50,9 @@ __all__ = [
     "Marched",
     "Mesh",
     "MeshFileError",
+    "Mode",
     "Nearest",
+    "Paper",
     "Rate",
     "Rays",
     "Scene",

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from hybrid_rt import _threads
 from hybrid_rt.kernels import hybrid as kernels
 from hybrid_rt.march import march
+from hybrid_rt.modes import Mode
 from hybrid_rt.types import I64, Bool, DepthPyramid, GBuffer, Hits, HybridResult, Rays
 
 
@@ -26,10 +27,8 @@ def trace_hybrid(
     gbuffer: GBuffer,
     pyramid: DepthPyramid,
     tracer: Tracer,
-    mode: Literal["paper"] = "paper",
+    mode: str | Mode = "paper",
     *,
-    samples: int = 4,
-    max_steps: int | None = None,
     threads: int | None = None,
 ) -> HybridResult:
     """Return the hit of every ray, from the screen where it answers and from `tracer` elsewhere.
@@ -44,7 +43,7 @@ def trace_hybrid(
     tracer : Tracer
         An `EmbreeTracer`, a `BruteForceTracer` or anything with their `intersect`, over the scene
         of `gbuffer`.
-    mode, samples, max_steps, threads
+    mode, threads
         As in `march`; the tracer keeps its own number of threads.
 
     Returns
@@ -60,9 +59,7 @@ def trace_hybrid(
     wall-clock seconds, without JIT compilation only from the second call on.
     """
     clock = [time.perf_counter()]
-    marched = march(
-        rays, gbuffer, pyramid, mode=mode, samples=samples, max_steps=max_steps, threads=threads
-    )
+    marched = march(rays, gbuffer, pyramid, mode, threads=threads)
     clock.append(time.perf_counter())
     resolved = marched.resolved
     with _threads.limited(threads):
@@ -94,7 +91,7 @@ def trace_hybrid(
         clock.append(time.perf_counter())
     stages = ("march", "compaction", "fallback", "merge")
     timings = {stage: clock[k + 1] - clock[k] for k, stage in enumerate(stages)}
-    return HybridResult(hits, resolved, marched.status, marched.pixel, timings)
+    return HybridResult(hits, marched, timings)
 
 
 def _compact(rays: Rays, resolved: Bool) -> tuple[I64, Rays]:

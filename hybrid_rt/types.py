@@ -485,12 +485,15 @@ class Marched:
     ----------
     status : (N,) uint8
         A `MarchStatus` for each ray.
+    resolved : (N,) bool
+        Whether the march answers the ray, with a hit or, where `prim_id` is -1, with a miss. What
+        resolves a ray is up to the mode.
     pixel : (N, 2) int32
-        The pixel (x, y) that answers the ray, (-1, -1) for unresolved.
+        The pixel (x, y) that answers the ray with a hit, else (-1, -1).
     prim_id : (N,) int32
-        The primitive visible in that pixel, -1 for unresolved.
+        The primitive that is hit, -1 for a miss and for unresolved.
     t : (N,) float32
-        Where the ray meets that pixel's tilted plane, infinity for unresolved.
+        Where it is hit, infinity for a miss and for unresolved.
     t_free : (N,) float32
         Up to here the march found the ray in front of everything that it read.
     steps : (N,) int32
@@ -500,6 +503,7 @@ class Marched:
     """
 
     status: U8
+    resolved: Bool
     pixel: I32
     prim_id: I32
     t: F32
@@ -507,13 +511,22 @@ class Marched:
     steps: I32
     steps_by_level: I64
 
+    @classmethod
+    def unfilled(cls, n: int, levels: int) -> Marched:
+        """Return room for `n` rays, with nothing in it yet, for code that writes every row."""
+        return cls(
+            np.empty(n, np.uint8),
+            np.empty(n, np.bool_),
+            np.empty((n, 2), np.int32),
+            np.empty(n, np.int32),
+            np.empty(n, np.float32),
+            np.empty(n, np.float32),
+            np.empty(n, np.int32),
+            np.empty(levels, np.int64),
+        )
+
     def __len__(self) -> int:
         return len(self.status)
-
-    @property
-    def resolved(self) -> Bool:
-        """(N,) bool: the rays that the march answers."""
-        return np.asarray(self.status == MarchStatus.HIT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -524,18 +537,27 @@ class HybridResult:
     ----------
     hits : Hits
         For every ray, from the march or from the tracer.
-    resolved : (N,) bool
-        Whether the march answered the ray.
-    status : (N,) uint8
-        `MarchStatus` of every ray.
-    pixel : (N, 2) int32
-        The pixel that answered the ray, (-1, -1) where the tracer did.
+    marched : Marched
+        What the march said of every ray.
     timings : dict of str to float
         Seconds of the stages "march", "compaction", "fallback", "merge".
     """
 
     hits: Hits
-    resolved: Bool
-    status: U8
-    pixel: I32
+    marched: Marched
     timings: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def resolved(self) -> Bool:
+        """(N,) bool: whether the march answered the ray."""
+        return self.marched.resolved
+
+    @property
+    def status(self) -> U8:
+        """(N,) uint8: `MarchStatus` of every ray."""
+        return self.marched.status
+
+    @property
+    def pixel(self) -> I32:
+        """(N, 2) int32: the pixel that answered the ray, (-1, -1) where none did."""
+        return self.marched.pixel

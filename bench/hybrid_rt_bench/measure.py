@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 import hybrid_rt as hrt
 from hybrid_rt_bench import quality, shade, strongest, summary
@@ -132,18 +133,19 @@ def measure_cell(
     reference = loaded.reference.intersect(rays)
     results, verdicts = [], []
     unstable: dict[str, float] = {}
+    steps_by_level: dict[str, NDArray[np.int64]] = {}
     for technique in techniques:
         result = hrt.trace_hybrid(
             rays, gbuffer, pyramid, stages.tracer, mode=technique.mode, threads=threads
         )
         found = quality.judge(rays, gbuffer, result, reference)
-        marched = hrt.march(rays, gbuffer, pyramid, mode=technique.mode, threads=threads)
+        steps_by_level[technique.name] = result.marched.steps_by_level
         timed = _by_stage(rows, technique.name)
         results.append(
             {
                 "technique": technique.name,
                 **found.columns,
-                "steps_per_ray": float(marched.steps.mean()),
+                "steps_per_ray": float(result.marched.steps.mean()),
                 **summary.timing_columns(timed, found.columns["alpha"]),
                 "embree_path": mirror_choice.best.label,
                 "embree_primary_path": primary_choice.best.label,
@@ -159,7 +161,9 @@ def measure_cell(
         "rays": len(rays),
         "embree_ns_per_ray": mirror_choice.nanoseconds,
         "embree_primary_ns_per_ray": primary_choice.nanoseconds,
-        "steps_by_level": [int(n) for n in marched.steps_by_level],
+        "steps_by_level": {
+            technique: [int(n) for n in steps] for technique, steps in steps_by_level.items()
+        },
     }
     return CellRecord(details, rows, results, verdicts, picture or None)
 

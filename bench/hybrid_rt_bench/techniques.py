@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
+import hybrid_rt as hrt
 from hybrid_rt.errors import UnknownNameError
 
 
@@ -16,13 +16,13 @@ class Technique:
     ----------
     name : str
     description : str
-    mode : str
-        The mode of `hybrid_rt.march` and `hybrid_rt.trace_hybrid`.
+    mode : Mode
+        For `hybrid_rt.march` and `hybrid_rt.trace_hybrid`.
     """
 
     name: str
     description: str
-    mode: Literal["paper"]
+    mode: hrt.Mode
 
 
 TECHNIQUES = {
@@ -31,7 +31,7 @@ TECHNIQUES = {
         Technique(
             "paper",
             "The paper's strict march through a nearest-depth pyramid, then Embree for the rest",
-            "paper",
+            hrt.Paper(),
         ),
     )
 }

@@ -67,7 +67,15 @@ def barycentrics(ax, ay, az, bx, by, bz, cx, cy, cz, nx, ny, nz, px, py, pz):
 
 @kernel
 def answer(i, origin, direction, prim, distance, vertices, faces, t, prim_id, u, v, n_g):
-    """Write the hit of ray i on primitive `prim` at t = `distance`."""
+    """Write the hit of ray i on primitive `prim` at t = `distance`, or a miss for -1."""
+    t[i] = distance
+    prim_id[i] = prim
+    if prim < 0:
+        u[i] = 0.0
+        v[i] = 0.0
+        for axis in range(3):
+            n_g[i, axis] = 0.0
+        return
     a, b, c = faces[prim, 0], faces[prim, 1], faces[prim, 2]
     ax, ay, az = np.float64(vertices[a, 0]), np.float64(vertices[a, 1]), np.float64(vertices[a, 2])
     bx, by, bz = np.float64(vertices[b, 0]), np.float64(vertices[b, 1]), np.float64(vertices[b, 2])
@@ -92,8 +100,6 @@ def answer(i, origin, direction, prim, distance, vertices, faces, t, prim_id, u,
         origin[i, 1] + np.float64(distance) * direction[i, 1],
         origin[i, 2] + np.float64(distance) * direction[i, 2],
     )
-    t[i] = distance
-    prim_id[i] = prim
     u[i] = uu
     v[i] = vv
     n_g[i, 0] = nx

@@ -205,7 +205,7 @@ def test_rays_in_a_plane_hit_none_of_it(slope):
     rays = hrt.Rays.from_arrays(origin, direction.astype(float))
     found = hrt.Truth(scene).nearest(rays)
     assert found.prim_id.tolist() == [144] * 4
-    assert (found.t == [11.5, 11.5 / 4, 11.5 / 3, 11.5]).all()
+    np.testing.assert_allclose(found.t, [11.5, 11.5 / 4, 11.5 / 3, 11.5], rtol=1e-12)
     assert (found.t_grazed < 1).all()
 
 

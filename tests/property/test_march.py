@@ -8,7 +8,7 @@ import hybrid_rt as hrt
 import synthetic
 from hybrid_rt import _threads
 
-FIELDS = ("status", "pixel", "prim_id", "t", "t_free", "steps")
+FIELDS = ("status", "resolved", "pixel", "prim_id", "t", "t_free", "steps")
 seeds = st.integers(0, 2**32 - 1)
 
 
@@ -34,8 +34,8 @@ def test_permuting_rays_permutes_results(seed):
 @given(seeds, st.integers(1, 8))
 def test_the_number_of_threads_changes_nothing(seed, samples):
     _, buffer, pyramid, rays = case(seed, n=3000)
-    one = hrt.march(rays, buffer, pyramid, samples=samples, threads=1)
-    all_ = hrt.march(rays, buffer, pyramid, samples=samples, threads=_threads.available())
+    one = hrt.march(rays, buffer, pyramid, hrt.Paper(samples), threads=1)
+    all_ = hrt.march(rays, buffer, pyramid, hrt.Paper(samples), threads=_threads.available())
     for name in (*FIELDS, "steps_by_level"):
         np.testing.assert_array_equal(getattr(one, name), getattr(all_, name))
 

@@ -5,7 +5,7 @@ import pytest
 
 import hybrid_rt as hrt
 import synthetic
-from hybrid_rt.kernels import march as kernels
+from hybrid_rt.kernels import screen as kernels
 from naive import march as naive
 
 S = hrt.MarchStatus
@@ -41,7 +41,7 @@ def test_agrees_with_the_oracle(seed, samples):
         width, height = (int(n) for n in rng.integers(1, 40, 2))
         buffer = synthetic.random_gbuffer(rng, width, height)
         rays = synthetic.random_rays(rng, buffer, 60)
-        marched = hrt.march(rays, buffer, hrt.build_depth_pyramid(buffer), samples=samples)
+        marched = hrt.march(rays, buffer, hrt.build_depth_pyramid(buffer), hrt.Paper(samples))
         camera = buffer.camera
         for i in range(len(rays)):
             expected = naive.march(
@@ -95,7 +95,7 @@ def test_every_way_to_end():
         (empty, (0, 0, 1), {"t_far": 1.0}, S.MISS),
         (wall(), (0, 0, -1), {"t_far": 1.0}, S.MISS),
         (wall(depth=0.09), (1, 0, 0), {}, S.HIDDEN),
-        (empty, (1, 0, 0), {"max_steps": 1}, S.EXHAUSTED),
+        (empty, (1, 0, 0), {"mode": hrt.Paper(max_steps=1)}, S.EXHAUSTED),
         (empty, (0, 0, 0), {}, S.INVALID),
         (empty, (np.nan, 0, 1), {}, S.INVALID),
         (empty, (np.inf, 0, 1), {}, S.INVALID),
@@ -162,7 +162,7 @@ def test_steps_are_counted_by_level():
 
 def test_an_empty_view_is_crossed_in_few_steps():
     buffer = synthetic.gbuffer(np.zeros((1024, 1024)))
-    marched = march_one(buffer, (-1.0, -0.3, -2), (1, 0.3, 0), samples=1)
+    marched = march_one(buffer, (-1.0, -0.3, -2), (1, 0.3, 0), mode=hrt.Paper(samples=1))
     assert marched.status[0] == S.OFFSCREEN
     assert marched.steps[0] <= 2 * len(hrt.build_depth_pyramid(buffer))
 
@@ -176,7 +176,7 @@ def test_the_default_budget_is_never_used_up():
     y = 1.5
     start = hrt.unproject(buffer.camera, [[0.5, y, 0.05]])[0]
     end = hrt.unproject(buffer.camera, [[width - 0.5, y, 0.05]])[0]
-    marched = march_one(buffer, start, end - start, samples=1)
+    marched = march_one(buffer, start, end - start, mode=hrt.Paper(samples=1))
     assert marched.status[0] == S.OFFSCREEN
     assert width <= marched.steps[0] <= 2 * (width + height) + 2
 
@@ -192,15 +192,22 @@ def test_nothing_to_march():
     ("kwargs", "argument"),
     [
         ({"mode": "magic"}, "mode"),
-        ({"samples": 0}, "samples"),
-        ({"max_steps": 0}, "max_steps"),
+        ({"mode": 4}, "mode"),
         ({"threads": 0}, "threads"),
-        ({"samples": 2.5}, "samples"),
     ],
 )
 def test_bad_arguments(kwargs, argument):
     with pytest.raises(hrt.ArgumentError, match=argument):
         march_one(wall(), (0, 0, -2), (0, 0, -1), **kwargs)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "argument"),
+    [({"samples": 0}, "samples"), ({"samples": 2.5}, "samples"), ({"max_steps": 0}, "max_steps")],
+)
+def test_bad_parameters(parameters, argument):
+    with pytest.raises(hrt.ArgumentError, match=argument):
+        hrt.Paper(**parameters)
 
 
 def test_the_pyramid_of_another_view_is_refused():

@@ -1,0 +1,51 @@
+"""The paper's march: nearest depths of a pyramid, then the tilted plane of one or two pixels."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid_rt import _threads
+from hybrid_rt.kernels import paper as kernels
+from hybrid_rt.modes import Paper
+from hybrid_rt.types import DepthPyramid, GBuffer, Marched, Rays
+
+
+def march(
+    rays: Rays, gbuffer: GBuffer, pyramid: DepthPyramid, mode: Paper, threads: int | None
+) -> Marched:
+    """Return what `Paper` says about each ray; arguments as `hybrid_rt.march` has checked them."""
+    height, width = gbuffer.depth.shape
+    max_steps = 2 * (width + height) + 2 if mode.max_steps is None else mode.max_steps
+    marched = Marched.unfilled(len(rays), len(pyramid))
+    with _threads.limited(threads) as workers:
+        steps_by_level = np.zeros((workers, len(pyramid)), np.int64)
+        kernels.march(
+            workers,
+            rays.origin,
+            rays.direction,
+            rays.pixel,
+            rays.t_near,
+            rays.t_far,
+            gbuffer.depth,
+            gbuffer.ddx,
+            gbuffer.ddy,
+            gbuffer.prim_id,
+            pyramid.data,
+            pyramid.offsets,
+            pyramid.widths,
+            gbuffer.camera.pixel_from_world,
+            np.array(gbuffer.camera.eye),
+            gbuffer.camera.near,
+            mode.samples,
+            max_steps,
+            marched.status,
+            marched.resolved,
+            marched.pixel,
+            marched.prim_id,
+            marched.t,
+            marched.t_free,
+            marched.steps,
+            steps_by_level,
+        )
+    steps_by_level.sum(axis=0, out=marched.steps_by_level)
+    return marched
