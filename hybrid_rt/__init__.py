@@ -25,6 +25,7 @@ from hybrid_rt.rays import (
 )
 from hybrid_rt.scene import load_scene
 from hybrid_rt.trace import BruteForceTracer, EmbreeTracer, embree_info, packet_available
+from hybrid_rt.truth import Nearest, Truth
 from hybrid_rt.types import (
     Camera,
     DepthPyramid,
@@ -63,6 +64,7 @@ __all__ = [
     "Mesh",
     "MeshFileError",
     "Mode",
+    "Nearest",
     "OcclusionResult",
     "Paper",
     "PointLight",
@@ -70,6 +72,7 @@ __all__ = [
     "Rate",
     "Rays",
     "Scene",
+    "Truth",
     "UnknownNameError",
     "Verdict",
     "alpha",
