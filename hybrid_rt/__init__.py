@@ -11,10 +11,11 @@ from hybrid_rt.errors import (
 from hybrid_rt.hybrid import trace_hybrid
 from hybrid_rt.io import read_mesh
 from hybrid_rt.march import march
-from hybrid_rt.metrics import Judged, Rate, Verdict, alpha, by_status, judge, rates
+from hybrid_rt.metrics import Judged, Verdict, alpha, by_status, judge, rates
 from hybrid_rt.modes import Mode, Paper
 from hybrid_rt.pyramid import build_depth_pyramid
 from hybrid_rt.raster import rasterize
+from hybrid_rt.rate import Rate
 from hybrid_rt.rays import mirror_rays
 from hybrid_rt.scene import load_scene
 from hybrid_rt.trace import BruteForceTracer, EmbreeTracer, embree_info, packet_available

@@ -59,7 +59,7 @@ def judge(
         "alpha": alpha.value,
         "alpha_low": alpha.low,
         "alpha_high": alpha.high,
-        **_rate("wrong", metrics.Rate.of(int(wrong.sum()), n)),
+        **_rate("wrong", hrt.Rate.of(int(wrong.sum()), n)),
     }
     for name, rate in rates.items():
         if name not in ("alpha", "correct"):
@@ -93,7 +93,7 @@ def picture(
     return grey, classes
 
 
-def _rate(name: str, rate: metrics.Rate) -> dict[str, Any]:
+def _rate(name: str, rate: hrt.Rate) -> dict[str, Any]:
     return {
         f"{name}_count": rate.count,
         f"{name}_rate": rate.value,
