@@ -15,6 +15,8 @@ import pandas as pd
 from hybrid_rt.rate import Rate
 from hybrid_rt_bench import stats
 
+__all__ = ["CELL", "POINT", "VERDICTS", "WRONG", "Pooled", "Rate", "pareto", "pools"]
+
 WRONG = ("false_hit", "false_miss")
 """The verdicts that make an answer wrong."""
 
@@ -76,18 +78,14 @@ class Pooled:
         steps = self.rows["steps"].sum(min_count=1)
         return float(steps) / self.rays if self.rays else float("nan")
 
-    @property
-    def march_rate(self) -> float:
-        """Millions of rays that the march alone goes through in a second; NaN if nothing is timed.
+    def per_second(self, column: str) -> float:
+        """Return millions of rays a second, by a column of milliseconds; NaN if nothing is timed.
 
-        Of all timed rows together: their rays over the sum of their median times.
+        Of all timed rows together: their rays over the sum of their times.
         """
-        return self._rays_per_second("march_ms")
-
-    @property
-    def hybrid_rate(self) -> float:
-        """As `march_rate`, of the whole hybrid."""
-        return self._rays_per_second("hybrid_ms")
+        timed = self.rows[self.rows[column] > 0]
+        milliseconds = float(timed[column].sum())
+        return float(timed["rays"].sum()) / milliseconds / 1e3 if milliseconds else float("nan")
 
     def median(self, column: str) -> float:
         """Return the median over rows; NaN where no row has a value."""
@@ -121,11 +119,6 @@ class Pooled:
         ratios = (mine["embree"] / mine["hybrid"]).groupby([mine[key] for key in keys], sort=False)
         groups = [group.to_numpy() for _, group in ratios]
         return stats.geometric_mean_of_medians(groups) if groups else None
-
-    def _rays_per_second(self, column: str) -> float:
-        timed = self.rows[self.rows[column] > 0]
-        milliseconds = float(timed[column].sum())
-        return float(timed["rays"].sum()) / milliseconds / 1e3 if milliseconds else float("nan")
 
 
 def pools(rows: pd.DataFrame, by: Sequence[str]) -> dict[tuple[str, ...], Pooled]:

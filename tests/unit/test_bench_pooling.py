@@ -68,14 +68,14 @@ def test_a_count_of_zero_keeps_its_upper_bound():
 
 def test_untimed_rows_do_not_slow_the_rates_down():
     x = pools(frame(), ["technique"])[("x",)]
-    assert x.march_rate == pytest.approx(100 / 1e-3 / 1e6)
-    assert x.hybrid_rate == pytest.approx(100 / 4e-3 / 1e6)
+    assert x.per_second("march_ms") == pytest.approx(100 / 1e-3 / 1e6)
+    assert x.per_second("hybrid_ms") == pytest.approx(100 / 4e-3 / 1e6)
 
 
 def test_what_no_row_has_is_nan():
     y = pools(frame(), ["technique"])[("y",)]
-    assert np.isnan([y.steps_per_ray, y.march_rate, y.median("error_t_p50")]).all()
-    assert y.hybrid_rate == pytest.approx(300 / 3e-3 / 1e6)
+    assert np.isnan([y.steps_per_ray, y.per_second("march_ms"), y.median("error_t_p50")]).all()
+    assert y.per_second("hybrid_ms") == pytest.approx(300 / 3e-3 / 1e6)
 
 
 def test_speedup_is_the_geometric_mean_of_the_cells_paired_medians():

@@ -1,0 +1,102 @@
+"""The points of an error experiment: techniques with their parameters, and what they read."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import hybrid_rt as hrt
+from hybrid_rt_bench.techniques import Technique
+
+
+@dataclass(frozen=True)
+class Point:
+    """A technique with parameters.
+
+    Attributes
+    ----------
+    technique : str
+    label : str
+        Says the parameters; unique among the points of the technique.
+    mode : Mode
+    default : bool
+        Whether these are the technique's default parameters.
+    lists : int
+        Length of the lists of primitives that the G-buffer has to hold; 0 for none.
+    """
+
+    technique: str
+    label: str
+    mode: hrt.Mode
+    default: bool
+    lists: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Screen:
+    """What a march reads of a view.
+
+    Attributes
+    ----------
+    gbuffer : GBuffer
+    pyramid : DepthPyramid
+    seconds : float
+        What it took to make what a plain raster does not give: the pyramid, and lists if any.
+    """
+
+    gbuffer: hrt.GBuffer
+    pyramid: Any
+    seconds: float
+
+
+class View:
+    """What one view has on its screen, each form of it made once, when first asked for.
+
+    Parameters
+    ----------
+    scene : Scene
+    camera : Camera
+    threads : int
+    """
+
+    def __init__(self, scene: hrt.Scene, camera: hrt.Camera, threads: int) -> None:
+        self.scene, self.camera, self.threads = scene, camera, threads
+        self.gbuffer, self.raster_seconds = _timed(
+            lambda: hrt.rasterize(scene, camera, threads=threads)
+        )
+        self._screens: dict[tuple[str, int], Screen] = {}
+
+    def screen(self, point: Point) -> Screen:
+        """Return what the march of a point reads."""
+        key = (type(point.mode).__name__, point.lists)
+        if key not in self._screens:
+            self._screens[key] = self._make(point)
+        return self._screens[key]
+
+    def _make(self, point: Point) -> Screen:
+        pyramid, seconds = _timed(
+            lambda: hrt.build_depth_pyramid(self.gbuffer, threads=self.threads)
+        )
+        return Screen(self.gbuffer, pyramid, seconds)
+
+
+def points_of(technique: Technique, scene: hrt.Scene, *, every: bool) -> list[Point]:
+    """Return the points of a technique, the one of its default parameters first.
+
+    Parameters
+    ----------
+    technique : Technique
+    scene : Scene
+        What lengths in world units relate to.
+    every : bool
+        All of them; else the default alone.
+    """
+    return [Point(technique.name, "default", technique.mode, default=True)]
+
+
+def _timed(call: Callable[[], Any]) -> tuple[Any, float]:
+    start = time.perf_counter()
+    made = call()
+    return made, time.perf_counter() - start
