@@ -19,6 +19,7 @@ from hybrid_rt.rate import Rate
 from hybrid_rt.rays import mirror_rays
 from hybrid_rt.scene import load_scene
 from hybrid_rt.trace import BruteForceTracer, EmbreeTracer, embree_info, packet_available
+from hybrid_rt.truth import Nearest, Truth
 from hybrid_rt.types import (
     Camera,
     DepthPyramid,
@@ -51,10 +52,12 @@ __all__ = [
     "Mesh",
     "MeshFileError",
     "Mode",
+    "Nearest",
     "Paper",
     "Rate",
     "Rays",
     "Scene",
+    "Truth",
     "UnknownNameError",
     "Verdict",
     "alpha",
