@@ -8,15 +8,22 @@ from hybrid_rt.errors import (
     MeshFileError,
     UnknownNameError,
 )
-from hybrid_rt.hybrid import trace_hybrid
+from hybrid_rt.hybrid import occluded_hybrid, trace_hybrid
 from hybrid_rt.io import read_mesh
+from hybrid_rt.lights import AreaLight, DirectionalLight, Light, PointLight
 from hybrid_rt.march import march
-from hybrid_rt.metrics import Judged, Verdict, alpha, by_status, judge, rates
+from hybrid_rt.metrics import Judged, Verdict, alpha, by_status, judge, judge_occlusion, rates
 from hybrid_rt.modes import Mode, Paper
 from hybrid_rt.pyramid import build_depth_pyramid
 from hybrid_rt.raster import rasterize
 from hybrid_rt.rate import Rate
-from hybrid_rt.rays import mirror_rays
+from hybrid_rt.rays import (
+    ambient_occlusion_rays,
+    diffuse_rays,
+    glossy_rays,
+    mirror_rays,
+    shadow_rays,
+)
 from hybrid_rt.scene import load_scene
 from hybrid_rt.trace import BruteForceTracer, EmbreeTracer, embree_info, packet_available
 from hybrid_rt.truth import Nearest, Truth
@@ -29,6 +36,7 @@ from hybrid_rt.types import (
     Marched,
     MarchStatus,
     Mesh,
+    OcclusionResult,
     Rays,
     Scene,
 )
@@ -36,10 +44,12 @@ from hybrid_rt.types import (
 __version__ = "0.1.0"
 
 __all__ = [
+    "AreaLight",
     "ArgumentError",
     "BruteForceTracer",
     "Camera",
     "DepthPyramid",
+    "DirectionalLight",
     "EmbreeError",
     "EmbreeTracer",
     "GBuffer",
@@ -47,13 +57,16 @@ __all__ = [
     "HybridRTError",
     "HybridResult",
     "Judged",
+    "Light",
     "MarchStatus",
     "Marched",
     "Mesh",
     "MeshFileError",
     "Mode",
     "Nearest",
+    "OcclusionResult",
     "Paper",
+    "PointLight",
     "Rate",
     "Rays",
     "Scene",
@@ -61,18 +74,24 @@ __all__ = [
     "UnknownNameError",
     "Verdict",
     "alpha",
+    "ambient_occlusion_rays",
     "build_depth_pyramid",
     "by_status",
+    "diffuse_rays",
     "embree_info",
+    "glossy_rays",
     "judge",
+    "judge_occlusion",
     "load_scene",
     "march",
     "mirror_rays",
+    "occluded_hybrid",
     "packet_available",
     "project",
     "rasterize",
     "rates",
     "read_mesh",
+    "shadow_rays",
     "trace_hybrid",
     "unproject",
 ]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from typing import Protocol
+from collections.abc import Callable
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -11,7 +12,19 @@ from hybrid_rt import _threads
 from hybrid_rt.kernels import hybrid as kernels
 from hybrid_rt.march import march
 from hybrid_rt.modes import Mode
-from hybrid_rt.types import I64, Bool, DepthPyramid, GBuffer, Hits, HybridResult, Rays
+from hybrid_rt.types import (
+    I64,
+    Bool,
+    DepthPyramid,
+    GBuffer,
+    Hits,
+    HybridResult,
+    Marched,
+    OcclusionResult,
+    Rays,
+)
+
+Answer = TypeVar("Answer")
 
 
 class Tracer(Protocol):
@@ -19,6 +32,14 @@ class Tracer(Protocol):
 
     def intersect(self, rays: Rays) -> Hits:
         """Return the nearest hit of each ray."""
+        ...
+
+
+class OcclusionTracer(Protocol):
+    """Whatever says exactly which rays are free."""
+
+    def occluded(self, rays: Rays) -> Bool:
+        """Return, as (N,) bool, whether each ray hits anything between its t_near and t_far."""
         ...
 
 
@@ -58,18 +79,11 @@ def trace_hybrid(
     Unresolved rays are traced in their order, so that neighbours stay neighbours. `timings` holds
     wall-clock seconds, without JIT compilation only from the second call on.
     """
-    clock = [time.perf_counter()]
-    marched = march(rays, gbuffer, pyramid, mode, threads=threads)
-    clock.append(time.perf_counter())
-    resolved = marched.resolved
-    with _threads.limited(threads):
-        starts, rest = _compact(rays, resolved)
-        clock.append(time.perf_counter())
-        traced = tracer.intersect(rest)
-        clock.append(time.perf_counter())
+
+    def merge(marched: Marched, starts: I64, traced: Hits) -> Hits:
         hits = Hits.unfilled(len(rays))
         kernels.merge(
-            resolved,
+            marched.resolved,
             starts,
             rays.origin,
             rays.direction,
@@ -88,10 +102,80 @@ def trace_hybrid(
             hits.v,
             hits.n_g,
         )
+        return hits
+
+    def first() -> Marched:
+        return march(rays, gbuffer, pyramid, mode, threads=threads)
+
+    return HybridResult(*_in_stages(rays, first, tracer.intersect, merge, threads))
+
+
+def occluded_hybrid(
+    rays: Rays,
+    gbuffer: GBuffer,
+    pyramid: DepthPyramid,
+    tracer: OcclusionTracer,
+    mode: str | Mode = "paper",
+    *,
+    threads: int | None = None,
+) -> OcclusionResult:
+    """Return whether each ray meets anything, from the screen where it says so, else from `tracer`.
+
+    Parameters
+    ----------
+    rays : Rays
+        N rays, world; any hit with ``t_near <= t <= t_far`` occludes.
+    gbuffer : GBuffer
+    pyramid : DepthPyramid
+        Of `gbuffer`.
+    tracer : OcclusionTracer
+        An `EmbreeTracer`, a `BruteForceTracer` or anything with their `occluded`, over the scene of
+        `gbuffer`.
+    mode, threads
+        As in `march`, which is asked for any hit; the tracer keeps its own number of threads.
+
+    Returns
+    -------
+    OcclusionResult
+        N answers. A ray that the march resolves is occluded where it names a primitive and free
+        where it resolves to a miss.
+
+    Notes
+    -----
+    As for `trace_hybrid`.
+    """
+
+    def merge(marched: Marched, starts: I64, traced: Bool) -> Bool:
+        occluded = np.empty(len(rays), np.bool_)
+        kernels.merge_occlusion(marched.resolved, starts, marched.prim_id, traced, occluded)
+        return occluded
+
+    def first() -> Marched:
+        return march(rays, gbuffer, pyramid, mode, any_hit=True, threads=threads)
+
+    return OcclusionResult(*_in_stages(rays, first, tracer.occluded, merge, threads))
+
+
+def _in_stages(
+    rays: Rays,
+    first: Callable[[], Marched],
+    trace: Callable[[Rays], Answer],
+    merge: Callable[[Marched, I64, Answer], Answer],
+    threads: int | None,
+) -> tuple[Answer, Marched, dict[str, float]]:
+    """March, trace what is left, merge; return the answers, the march, and seconds by stage."""
+    clock = [time.perf_counter()]
+    marched = first()
+    clock.append(time.perf_counter())
+    with _threads.limited(threads):
+        starts, rest = _compact(rays, marched.resolved)
+        clock.append(time.perf_counter())
+        traced = trace(rest)
+        clock.append(time.perf_counter())
+        merged = merge(marched, starts, traced)
         clock.append(time.perf_counter())
     stages = ("march", "compaction", "fallback", "merge")
-    timings = {stage: clock[k + 1] - clock[k] for k, stage in enumerate(stages)}
-    return HybridResult(hits, marched, timings)
+    return merged, marched, {stage: clock[k + 1] - clock[k] for k, stage in enumerate(stages)}
 
 
 def _compact(rays: Rays, resolved: Bool) -> tuple[I64, Rays]:

@@ -14,6 +14,7 @@ def march(
     pyramid: DepthPyramid,
     mode: str | Mode = "paper",
     *,
+    any_hit: bool = False,
     threads: int | None = None,
 ) -> Marched:
     """Return what the screen says about each ray, and for which rays it says nothing.
@@ -28,6 +29,9 @@ def march(
         Of `gbuffer`.
     mode : {"paper"} or a mode object
         The technique; see `hybrid_rt.modes`. A name stands for its default parameters.
+    any_hit : bool
+        Whether any hit answers a ray and not only its nearest. For "paper", whose first hit is its
+        answer, this changes nothing.
     threads : int, optional
         Default: as many as Numba is set to.
 
@@ -52,6 +56,7 @@ def march(
     _check.instance("rays", rays, Rays)
     _check.instance("gbuffer", gbuffer, GBuffer)
     _check.instance("pyramid", pyramid, DepthPyramid)
+    _check.choice("any_hit", any_hit, (True, False))
     chosen = modes.named(mode)
     height, width = gbuffer.depth.shape
     if (pyramid.heights[0], pyramid.widths[0]) != (height, width):

@@ -75,7 +75,7 @@ def measure_cell(
     `on_pass` is called whenever the rays have been through one point.
     """
     reference = cell.query.trace(loaded.reference, cell.rays)
-    judged = _Judged(cell, view, loaded.reference, reference)
+    judged = _Judged(cell, view, loaded, reference)
     for point in cell.points:
         judged.add(point)
         on_pass()
@@ -104,8 +104,9 @@ def measure_cell(
 class _Judged:
     """The verdicts of a cell, point after point."""
 
-    def __init__(self, cell: Cell, view: View, robust: hrt.EmbreeTracer, reference: Any) -> None:
-        self.cell, self.view, self.robust, self.reference = cell, view, robust, reference
+    def __init__(self, cell: Cell, view: View, loaded: LoadedScene, reference: Any) -> None:
+        self.cell, self.view, self.reference = cell, view, reference
+        self.robust, self.truth = loaded.reference, loaded.truth
         self.results: list[dict[str, Any]] = []
         self.verdicts: list[dict[str, Any]] = []
         self.reference_wrong = np.zeros(len(cell.rays), np.bool_)
@@ -121,7 +122,7 @@ class _Judged:
         claims = cell.query.claims(result)
         marched = result.marched
         judged = cell.query.judge(
-            cell.rays, claims, self.reference, self.view.gbuffer, marched.pixel
+            cell.rays, claims, self.reference, self.view.camera, self.truth, marched.pixel
         )
         self._note(judged)
         row = {
@@ -143,7 +144,9 @@ class _Judged:
 
     def add_embree(self, mode: str, claims: Any) -> None:
         """Judge what Embree answers in one of its modes."""
-        judged = self.cell.query.judge(self.cell.rays, claims, self.reference, self.view.gbuffer)
+        judged = self.cell.query.judge(
+            self.cell.rays, claims, self.reference, self.view.camera, self.truth
+        )
         self._note(judged)
         row = _count_columns(judged, np.ones(len(self.cell.rays), np.bool_))
         if self.picture is not None:
@@ -153,18 +156,23 @@ class _Judged:
 
     def add_reference(self) -> None:
         """Count where the reference itself was found wrong, by any of the points judged before."""
-        n = len(self.cell.rays)
-        row = dict.fromkeys([*VERDICTS, *(f"all_{name}" for name in VERDICTS)], 0)
-        wrong = int(self.reference_wrong.sum())
-        row |= {"false_hit": wrong, "all_false_hit": wrong}
-        self.results.append(self._embree_row("robust", {"rays": n, "resolved": n, **row}))
+        cell = self.cell
+        verdict = cell.query.kinds(
+            cell.rays, self.reference, self.reference_wrong, self.view.camera, self.truth
+        )
+        counts = np.bincount(verdict, minlength=len(hrt.Verdict))
+        found = {name: int(counts[hrt.Verdict[name.upper()]]) for name in VERDICTS}
+        n = len(cell.rays)
+        row = {"rays": n, "resolved": n, "alpha": 1.0, **found}
+        row |= {f"all_{name}": count for name, count in found.items()}
+        self.results.append(self._embree_row("robust", {**row, **_wrong_columns(row)}))
 
     def _embree_row(self, mode: str, row: Columns) -> Columns:
         nothing = {"steps": np.nan, "prepare_ms": 0.0}
         return {**_names(EMBREE, mode, mode == "robust"), **row, **nothing}
 
     def _note(self, judged: hrt.Judged) -> None:
-        self.reference_wrong |= judged.verdict == hrt.Verdict.REFERENCE_WRONG
+        self.reference_wrong |= judged.reference_wrong
 
 
 def _names(technique: str, point: str, default: bool) -> Columns:
@@ -181,14 +189,18 @@ def _count_columns(judged: hrt.Judged, resolved: NDArray[np.bool_]) -> Columns:
         for name in VERDICTS:
             row[prefix + name] = int(counts[hrt.Verdict[name.upper()]])
     row["alpha"] = row["resolved"] / max(1, row["rays"])
-    wrong = hrt.Rate.of(sum(row[name] for name in WRONG), row["resolved"])
-    row |= {"wrong_rate": wrong.value, "wrong_low": wrong.low, "wrong_high": wrong.high}
+    row |= _wrong_columns(row)
     errors = judged.error_t[resolved]
     errors = errors[np.isfinite(errors)]
     p50, p99, most = np.quantile(errors, [0.5, 0.99, 1.0]) if len(errors) else [np.nan] * 3
     return row | {
         "error_t_p50": float(p50), "error_t_p99": float(p99), "error_t_max": float(most),
     }  # fmt: skip
+
+
+def _wrong_columns(row: Columns) -> Columns:
+    wrong = hrt.Rate.of(sum(row[name] for name in WRONG), row["resolved"])
+    return {"wrong_rate": wrong.value, "wrong_low": wrong.low, "wrong_high": wrong.high}
 
 
 def _by_status(marched: hrt.Marched, judged: hrt.Judged) -> list[dict[str, Any]]:

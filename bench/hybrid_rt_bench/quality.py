@@ -38,6 +38,7 @@ def judge(
     gbuffer: hrt.GBuffer,
     result: hrt.HybridResult,
     reference: hrt.Hits,
+    truth: hrt.Truth,
 ) -> Quality:
     """Return alpha, the rate of every verdict with its interval, and the errors in t and pixels."""
     judged = metrics.judge(
@@ -48,6 +49,7 @@ def judge(
         gbuffer.scene,
         gbuffer.camera,
         pixel=result.pixel,
+        truth=truth,
     )
     rates = metrics.rates(judged)
     wrong = np.isin(judged.verdict, [metrics.Verdict.FALSE_HIT, metrics.Verdict.FALSE_MISS])

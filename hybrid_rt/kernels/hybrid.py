@@ -108,6 +108,20 @@ def answer(i, origin, direction, prim, distance, vertices, faces, t, prim_id, u,
 
 
 @parallel_kernel
+def merge_occlusion(resolved, starts, march_prim, traced, occluded):
+    """Write whether each ray meets anything, from the march or else from the tracer; (N,) bool."""
+    n = resolved.shape[0]
+    for chunk in prange(starts.shape[0]):
+        j = starts[chunk]
+        for i in range(chunk * CHUNK, min(n, (chunk + 1) * CHUNK)):
+            if resolved[i]:
+                occluded[i] = march_prim[i] >= 0
+            else:
+                occluded[i] = traced[j]
+                j += 1
+
+
+@parallel_kernel
 def merge(
     resolved,
     starts,
