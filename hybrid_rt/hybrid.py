@@ -11,7 +11,7 @@ from hybrid_rt import _threads
 from hybrid_rt.kernels import hybrid as kernels
 from hybrid_rt.march import march
 from hybrid_rt.modes import Mode
-from hybrid_rt.types import I64, Bool, DepthPyramid, GBuffer, Hits, HybridResult, Rays
+from hybrid_rt.types import I64, Bool, GBuffer, Hits, HybridResult, Pyramid, Rays
 
 
 class Tracer(Protocol):
@@ -25,7 +25,7 @@ class Tracer(Protocol):
 def trace_hybrid(
     rays: Rays,
     gbuffer: GBuffer,
-    pyramid: DepthPyramid,
+    pyramid: Pyramid,
     tracer: Tracer,
     mode: str | Mode = "paper",
     *,
@@ -38,8 +38,8 @@ def trace_hybrid(
     rays : Rays
         N rays, world.
     gbuffer : GBuffer
-    pyramid : DepthPyramid
-        Of `gbuffer`.
+    pyramid : DepthPyramid or SlopePyramid
+        Of `gbuffer`; as in `march`.
     tracer : Tracer
         An `EmbreeTracer`, a `BruteForceTracer` or anything with their `intersect`, over the scene
         of `gbuffer`.
