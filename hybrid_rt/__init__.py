@@ -12,7 +12,15 @@ from hybrid_rt.hybrid import trace_hybrid
 from hybrid_rt.io import read_mesh
 from hybrid_rt.march import march
 from hybrid_rt.metrics import Judged, Rate, Verdict, alpha, by_status, judge, rates
-from hybrid_rt.modes import HiZ, Linear, Mode, Paper, PixelDDA, SlopeAware
+from hybrid_rt.modes import (
+    DEFAULT_THICKNESS,
+    HiZ,
+    Linear,
+    Mode,
+    Paper,
+    PixelDDA,
+    SlopeAware,
+)
 from hybrid_rt.pyramid import build_depth_pyramid
 from hybrid_rt.raster import rasterize
 from hybrid_rt.rays import mirror_rays
@@ -36,6 +44,7 @@ from hybrid_rt.types import (
 __version__ = "0.1.0"
 
 __all__ = [
+    "DEFAULT_THICKNESS",
     "ArgumentError",
     "BruteForceTracer",
     "Camera",
