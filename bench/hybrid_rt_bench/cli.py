@@ -17,7 +17,7 @@ from rich.table import Table as RichTable
 import hybrid_rt as hrt
 from hybrid_rt_bench.report.table import Table
 from hybrid_rt_bench.results import ReportsError, RunData, load_run
-from hybrid_rt_bench.spec import Experiment, Resolution, experiment_names, load_experiment
+from hybrid_rt_bench.spec import AnyExperiment, Resolution, experiment_names, load_experiment
 
 USAGE, FAILED, INTERRUPTED = 2, 3, 130
 
@@ -34,8 +34,8 @@ is traced with Embree. This program measures what that saves against tracing eve
 strongest Embree, and what it gets wrong.
 
 Begin with `hybrid-rt run paper --quick`, then `hybrid-rt list`.""",
-    epilog="""Exit codes: 0 all well, 2 wrong usage, 3 some cells failed or nothing could be run,
-130 stopped by Ctrl-C. What was finished is always kept.""",
+    epilog="""Exit codes: 0 all well, 2 wrong usage, 3 some cells failed, nothing could be run or
+a promise is broken, 130 stopped by Ctrl-C. What was finished is always kept.""",
 )
 out = Console(width=None if sys.stdout.isatty() else 160)
 err = Console(stderr=True)
@@ -101,20 +101,22 @@ def run(
 
     * `hybrid-rt run paper --scenes hall.glb --json > hall.json` - a mesh file of your own
     """
+    from hybrid_rt_bench.kinds import RUNNERS
     from hybrid_rt_bench.progress import Reporter
-    from hybrid_rt_bench.run import run_experiment
 
-    spec = _overridden(load_experiment(experiment, quick=quick), resolutions, rounds)
+    spec = load_experiment(experiment, quick=quick)
+    given = {"scenes": scenes, "cameras": cameras, "resolutions": resolutions, "rounds": rounds}
+    _check_options(spec, [name for name, value in given.items() if value is not None])
+    spec = _overridden(spec, resolutions, rounds)
+    picked = {
+        name: _names(f"--{name}", value)
+        for name, value in (("scenes", scenes), ("cameras", cameras))
+        if value is not None
+    }
     reporter = Reporter(err)
     with reporter:
-        outcome = run_experiment(
-            spec,
-            reporter=reporter,
-            scenes=_names("--scenes", scenes),
-            cameras=_names("--cameras", cameras),
-            threads=threads,
-            out=out_dir,
-            command=sys.argv[1:],
+        outcome = RUNNERS[spec.kind](
+            spec, reporter=reporter, threads=threads, out=out_dir, command=sys.argv[1:], **picked
         )
     summary: dict[str, Any] = {
         "run": outcome.folder.name,
@@ -122,6 +124,7 @@ def run(
         "measured": outcome.measured,
         "failed": outcome.failed,
         "interrupted": outcome.interrupted,
+        "broken": list(outcome.broken),
     }
     if outcome.measured:
         data = load_run(outcome.folder)
@@ -145,6 +148,9 @@ def run(
             f"{outcome.failed} failed, {_cells(outcome.measured)} kept in {outcome.folder}",
             style="bold red", soft_wrap=True,
         )  # fmt: skip
+    for promise in outcome.broken:
+        err.print(promise, style="bold red", soft_wrap=True, markup=False, highlight=False)
+    if outcome.failed or outcome.broken:
         raise typer.Exit(FAILED)
 
 
@@ -329,21 +335,23 @@ def _show(table: Table, document: Path | None = None) -> None:
     out.print()
 
 
-def _overridden(spec: Experiment, resolutions: str | None, rounds: int | None) -> Experiment:
+def _check_options(spec: AnyExperiment, given: list[str]) -> None:
+    """Refuse options that an experiment of this kind has no use for."""
+    for name in given:
+        if name not in spec.options:
+            known = ", ".join(f"--{option}" for option in sorted(spec.options)) or "none of them"
+            raise hrt.ArgumentError(
+                f"--{name}", f"an option that kind {spec.kind!r} has ({known})", f"--{name}"
+            )
+
+
+def _overridden(spec: AnyExperiment, resolutions: str | None, rounds: int | None) -> AnyExperiment:
     """Return the experiment with what the command line changes."""
-    changes: dict[str, Any] = {}
-    if rounds is not None:
-        if rounds < 1:
-            raise hrt.ArgumentError("--rounds", "an integer >= 1", str(rounds))
-        changes["rounds"] = rounds
+    if rounds is not None and rounds < 1:
+        raise hrt.ArgumentError("--rounds", "an integer >= 1", str(rounds))
     names = _names("--resolutions", resolutions)
-    if names is not None:
-        sizes = [Resolution.parse("--resolutions", name) for name in names]
-        changes["resolutions"] = sizes
-        if spec.picture not in sizes:  # the figure is made at the middle one of those measured
-            order = sorted(sizes, key=lambda r: r.width * r.height)
-            changes["picture"] = order[len(order) // 2]
-    return spec.model_copy(update=changes)
+    sizes = None if names is None else [Resolution.parse("--resolutions", n) for n in names]
+    return spec.overridden(sizes, rounds)
 
 
 def _cells(count: int) -> str:

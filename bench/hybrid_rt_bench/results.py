@@ -3,10 +3,11 @@
 ::
 
     reports/<run-id>/
-      run.json          schema version, environment, experiment, every cell with what became of it
-      samples.parquet   every raw sample, warm-up rounds too
+      run.json          schema version, environment, experiment and its kind, every cell with what
+                        became of it
+      samples.parquet   every raw sample, warm-up rounds too, of what is timed
       results.parquet   one row a cell and technique: medians, intervals, alpha, errors (also .csv)
-      verdicts.parquet  counts of rays by status and verdict
+      verdicts.parquet  counts of rays by status and verdict, where the kind has them
       pictures/*.npz    the pixels of the figures
       tables.md, figures/*.png   rendered from the files above, at any time
 
@@ -55,6 +56,7 @@ PIXEL_CLASSES = {"background": 0, "right": 1, "unresolved": 2, "wrong": 3}
 """What the pixels of a stored picture say."""
 
 CELL_KEYS = ("scene", "camera", "width", "height")
+"""What tells the cells of a run apart, unless its kind has keys of its own."""
 
 
 class ReportsError(HybridRTError):
@@ -71,6 +73,7 @@ class RunData:
     meta : dict
         ``run.json``.
     samples, results, verdicts : DataFrame
+        Empty where the run's kind has none.
     """
 
     folder: Path
@@ -84,12 +87,19 @@ class RunData:
         """The run's id."""
         return str(self.meta["id"])
 
+    @property
+    def kind(self) -> str:
+        """The kind of its experiment."""
+        return str(self.meta.get("kind", "paper"))
+
 
 class RunWriter:
-    """Write a run, cell by cell."""
+    """Write a run, cell by cell; `keys` tell its cells apart."""
 
-    def __init__(self, folder: Path, meta: dict[str, Any]) -> None:
-        self.folder = folder
+    def __init__(
+        self, folder: Path, meta: dict[str, Any], keys: tuple[str, ...] = CELL_KEYS
+    ) -> None:
+        self.folder, self.keys = folder, keys
         self.meta: dict[str, Any] = {
             "schema_version": SCHEMA_VERSION,
             "id": folder.name,
@@ -115,13 +125,13 @@ class RunWriter:
         Parameters
         ----------
         cell : dict
-            `CELL_KEYS` and whatever else is to be known of the cell.
+            The run's keys and whatever else is to be known of the cell.
         samples, results, verdicts : list of dict
             Rows; the cell's keys are added here.
         picture : dict of array, optional
             Pixels for the figure of the cell.
         """
-        keys = {key: cell[key] for key in CELL_KEYS}
+        keys = {key: cell[key] for key in self.keys}
         with _uninterrupted():
             if picture is not None:
                 name = f"pictures/{cell['scene']}-{cell['camera']}.npz"
@@ -175,7 +185,9 @@ class RunWriter:
         write_bytes(self.folder / "run.json", text.encode())
 
 
-def create_run(out: Path, experiment: str, meta: dict[str, Any]) -> RunWriter:
+def create_run(
+    out: Path, experiment: str, meta: dict[str, Any], keys: tuple[str, ...] = CELL_KEYS
+) -> RunWriter:
     """Return a writer for a new folder ``<date>-<time>-<experiment>`` in `out`.
 
     Raises
@@ -187,7 +199,7 @@ def create_run(out: Path, experiment: str, meta: dict[str, Any]) -> RunWriter:
     try:
         out.mkdir(parents=True, exist_ok=True)
         folder = _unique(out, f"{stamp}-{experiment}")
-        writer = RunWriter(folder, {"experiment": experiment, "started": timestamp(), **meta})
+        writer = RunWriter(folder, {"experiment": experiment, "started": timestamp(), **meta}, keys)
         writer.flush()
     except (OSError, ReportsError) as error:
         raise ArgumentError("out", "a directory that can be written to", _reason(error)) from error
@@ -219,10 +231,8 @@ def load_run(run: str | Path, out: Path = Path("reports")) -> RunData:
             )
         if not (folder / "results.parquet").is_file():
             raise ReportsError(f"{folder}: no cell was finished, there is nothing to report")
-        frames = [
-            pd.read_parquet(folder / f"{name}.parquet")
-            for name in ("samples", "results", "verdicts")
-        ]
+        paths = [folder / f"{name}.parquet" for name in ("samples", "results", "verdicts")]
+        frames = [pd.read_parquet(p) if p.is_file() else pd.DataFrame() for p in paths]
     except (OSError, ValueError, KeyError) as error:
         raise ReportsError(f"{folder}: not a readable run ({_reason(error)})") from error
     return RunData(folder, meta, *frames)

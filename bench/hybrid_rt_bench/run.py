@@ -1,4 +1,4 @@
-"""Run an experiment: every scene, camera and resolution in turn, kept as it is finished."""
+"""Run an experiment of kind "paper": scenes, cameras and resolutions in turn, each kept."""
 
 from __future__ import annotations
 
@@ -29,12 +29,15 @@ class Outcome:
     measured, failed : int
         Cells.
     interrupted : bool
+    broken : tuple of str
+        Sentences: what was promised and does not hold. A run with any is a failure.
     """
 
     folder: Path
     measured: int
     failed: int
     interrupted: bool
+    broken: tuple[str, ...] = ()
 
 
 def run_experiment(
@@ -87,6 +90,7 @@ def run_experiment(
         out,
         experiment.name,
         {
+            "kind": experiment.kind,
             "command": list(command),
             "spec": experiment.model_dump(mode="json", by_alias=True),
             "notes": plan.notes,

@@ -1,93 +1,50 @@
 """Experiments as TOML files say them: what is measured, apart from how.
 
-An experiment is a product of scenes, cameras and resolutions, for each of which every technique is
-measured. The definitions lie in the package's ``experiments`` folder; a path to another TOML file
-works as well.
+The definitions lie in the package's ``experiments`` folder; a path to another TOML file works as
+well. A file's ``kind`` says which class its other keys belong to. An experiment of kind "paper" is
+a product of scenes, cameras and resolutions, for each of which every technique is timed.
 """
 
 from __future__ import annotations
 
-import re
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, ClassVar, Literal, Self, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from hybrid_rt.errors import ArgumentError, UnknownNameError
+from hybrid_rt_bench.spec_base import AnyExperiment, Resolution, ResolutionText, SceneEntry
 
-SCHEMA = 1
-
-
-class Resolution(BaseModel):
-    """A picture's size in pixels, written ``1280x720``."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    width: int = Field(ge=1, le=32768)
-    height: int = Field(ge=1, le=32768)
-
-    @classmethod
-    def parse(cls, argument: str, text: str) -> Resolution:
-        """Return the resolution that `text` says.
-
-        Raises
-        ------
-        ArgumentError
-            Anything but ``WIDTHxHEIGHT`` with both in 1 to 32768.
-        """
-        match = re.fullmatch(r"\s*(\d{1,6})\s*[xX×]\s*(\d{1,6})\s*", text)
-        if match:
-            width, height = int(match[1]), int(match[2])
-            if 1 <= width <= 32768 and 1 <= height <= 32768:
-                return cls(width=width, height=height)
-        raise ArgumentError(
-            argument, "WIDTHxHEIGHT in pixels, each 1 to 32768, such as 1280x720", repr(text)
-        )
-
-    def __str__(self) -> str:
-        return f"{self.width}x{self.height}"
+__all__ = [
+    "KINDS",
+    "AnyExperiment",
+    "Experiment",
+    "Resolution",
+    "SceneEntry",
+    "experiment_names",
+    "load_experiment",
+    "parse_experiment",
+]
 
 
-def _resolution(value: Any) -> Any:
-    return Resolution.parse("resolution", value) if isinstance(value, str) else value
-
-
-ResolutionText = Annotated[Resolution, BeforeValidator(_resolution)]
-
-
-class SceneEntry(BaseModel):
-    """One scene of an experiment.
+class Experiment(AnyExperiment):
+    """An experiment of kind "paper".
 
     Attributes
     ----------
-    name : str
-        A registered scene, or a path to a mesh file.
-    row : str
-        The row of the paper's tables that it stands beside; empty for none.
-    stand_in : str, optional
-        Built-in scene that takes its place where its files are absent.
-    size : int, optional
-        Number of triangles asked of a built-in scene that has a size.
-    cameras : list of str, optional
-        Default: all of them.
+    techniques : list of str
+        Names registered in `hybrid_rt_bench.techniques`.
+    scenes, resolutions, picture, rounds, warmup, cameras, derivatives, selection_rays
+        As the comments in ``experiments/paper.toml`` say. `cameras` limits the number of cameras a
+        scene.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    options: ClassVar[frozenset[str]] = frozenset({"scenes", "cameras", "resolutions", "rounds"})
 
-    name: str = Field(min_length=1)
-    row: str = ""
-    stand_in: str | None = None
-    size: int | None = Field(default=None, ge=1)
-    cameras: list[str] | None = Field(default=None, min_length=1)
-
-
-class Settings(BaseModel):
-    """What of an experiment ``--quick`` may change."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
+    kind: Literal["paper"] = "paper"
+    techniques: list[str] = Field(min_length=1)
     scenes: list[SceneEntry] = Field(min_length=1)
     resolutions: list[ResolutionText] = Field(min_length=1)
     picture: ResolutionText
@@ -97,27 +54,14 @@ class Settings(BaseModel):
     derivatives: Literal["plane", "quad"] = "plane"
     selection_rays: int = Field(default=131072, ge=1024)
 
-
-class Experiment(Settings):
-    """A whole experiment.
-
-    Attributes
-    ----------
-    name, title : str
-    techniques : list of str
-        Names registered in `hybrid_rt_bench.techniques`.
-    scenes, resolutions, picture, rounds, warmup, cameras, derivatives, selection_rays
-        As the comments in ``experiments/paper.toml`` say. `cameras` limits the number of cameras a
-        scene.
-    quick : bool
-        Whether the quick form was asked for.
-    """
-
-    schema_version: Literal[1] = Field(default=1, alias="schema")
-    name: str
-    title: str
-    techniques: list[str] = Field(min_length=1)
-    quick: bool = False
+    def overridden(self, resolutions: list[Resolution] | None, rounds: int | None) -> Self:
+        """Return the experiment with what the command line changes; None changes nothing."""
+        changed = super().overridden(resolutions, rounds)
+        if resolutions is None or self.picture in resolutions:
+            return changed
+        # The figure is made at the middle one of the sizes measured.
+        order = sorted(resolutions, key=lambda r: r.width * r.height)
+        return changed.model_copy(update={"picture": order[len(order) // 2]})
 
     def row_of(self, scene: str) -> str:
         """Return the paper's row for a scene given by name on the command line."""
@@ -127,13 +71,17 @@ class Experiment(Settings):
         return ""
 
 
+KINDS: dict[str, type[AnyExperiment]] = {"paper": Experiment}
+"""The class of each kind of experiment."""
+
+
 def experiment_names() -> list[str]:
     """Return the names of the experiments that come with the package."""
     folder = resources.files("hybrid_rt_bench") / "experiments"
     return sorted(f.name[:-5] for f in folder.iterdir() if f.name.endswith(".toml"))
 
 
-def load_experiment(name: str, *, quick: bool = False) -> Experiment:
+def load_experiment(name: str, *, quick: bool = False) -> AnyExperiment:
     """Return the experiment of that name, or in the TOML file of that path.
 
     Parameters
@@ -161,25 +109,29 @@ def load_experiment(name: str, *, quick: bool = False) -> Experiment:
     return parse_experiment(text, source=Path(name).name, quick=quick)
 
 
-def parse_experiment(text: str, *, source: str, quick: bool = False) -> Experiment:
+def parse_experiment(text: str, *, source: str, quick: bool = False) -> AnyExperiment:
     """Return the experiment that a TOML text says; `source` names it in messages."""
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ArgumentError(source, "a TOML document", str(error)) from error
     quick_table = data.pop("quick", None)
-    full = _validate(Experiment, data, source)
+    kind = data.get("kind", "paper")
+    if kind not in KINDS:
+        raise UnknownNameError(f"kind in {source}", str(kind), KINDS)
+    model = KINDS[kind]
+    full = _validate(model, data, source)
     if not quick:
         if quick_table is not None:  # a mistake in it is reported at once, not by the next --quick
-            _validate(Experiment, {**data, **quick_table}, source)
+            _validate(model, {**data, **quick_table}, source)
         return full
     if quick_table is None:
         raise ArgumentError("--quick", f"a [quick] table in {source}", "none")
-    merged = _validate(Experiment, {**data, **quick_table}, source)
+    merged = _validate(model, {**data, **quick_table}, source)
     return merged.model_copy(update={"quick": True})
 
 
-def _validate(model: type[Experiment], data: dict[str, Any], source: str) -> Experiment:
+def _validate(model: type[AnyExperiment], data: dict[str, Any], source: str) -> AnyExperiment:
     try:
         return model.model_validate(data)
     except ValidationError as error:
@@ -187,7 +139,7 @@ def _validate(model: type[Experiment], data: dict[str, Any], source: str) -> Exp
         first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
         where = ".".join(str(part) for part in first["loc"])
         if first["type"] == "extra_forbidden":
-            keys = _keys(first["loc"])
+            keys = _keys(model, first["loc"])
             raise UnknownNameError(f"key in {source}", str(first["loc"][-1]), keys) from None
         if first["type"] == "missing":
             raise ArgumentError(f"{source}: {where}", "a value", "none") from None
@@ -198,9 +150,14 @@ def _validate(model: type[Experiment], data: dict[str, Any], source: str) -> Exp
         raise ArgumentError(f"{source}: {where}", message, repr(first["input"])) from None
 
 
-def _keys(location: tuple[int | str, ...]) -> list[str]:
+def _keys(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
     """Return the keys known in the table where a key was refused."""
-    if location[0] == "scenes" and len(location) > 1:
-        return sorted(SceneEntry.model_fields)
-    fields = Experiment.model_fields
-    return sorted({field.alias or name for name, field in fields.items()} | {"quick"})
+    top = True
+    for part in location[:-1]:
+        if part in model.model_fields:
+            annotation = model.model_fields[str(part)].annotation
+            for inner in get_args(annotation) or (annotation,):
+                if isinstance(inner, type) and issubclass(inner, BaseModel):
+                    model, top = inner, False
+    names = {field.alias or name for name, field in model.model_fields.items()}
+    return sorted(names | {"quick"} if top else names)

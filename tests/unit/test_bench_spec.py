@@ -1,7 +1,15 @@
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt_bench.spec import Resolution, experiment_names, load_experiment, parse_experiment
+from hybrid_rt_bench.kinds import RUNNERS
+from hybrid_rt_bench.report.render import FORMS
+from hybrid_rt_bench.spec import (
+    KINDS,
+    Resolution,
+    experiment_names,
+    load_experiment,
+    parse_experiment,
+)
 from hybrid_rt_bench.techniques import get_technique
 
 GOOD = """
@@ -25,7 +33,8 @@ def test_every_experiment_of_the_package_is_whole(name, quick):
     experiment = load_experiment(name, quick=quick)
     assert experiment.name == name
     assert experiment.quick is quick
-    assert experiment.picture in experiment.resolutions
+    if experiment.kind == "paper":
+        assert experiment.picture in experiment.resolutions
     for technique in experiment.techniques:
         get_technique(technique)
 
@@ -43,6 +52,17 @@ def test_quick_lays_its_table_over_the_rest():
     full, quick = (parse_experiment(GOOD, source="x.toml", quick=q) for q in (False, True))
     assert (full.rounds, quick.rounds) == (3, 1)
     assert full.scenes == quick.scenes
+
+
+def test_every_kind_has_a_class_a_runner_and_a_form():
+    assert set(KINDS) == set(RUNNERS) == set(FORMS)
+    for kind, model in KINDS.items():
+        assert model.model_fields["kind"].default == kind
+
+
+def test_an_unknown_kind_is_answered_with_the_nearest():
+    with pytest.raises(hrt.UnknownNameError, match="did you mean 'paper'"):
+        parse_experiment('kind = "papre"\n' + GOOD, source="x.toml")
 
 
 def test_unknown_experiment_is_answered_with_the_nearest():

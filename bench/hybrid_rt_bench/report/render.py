@@ -2,12 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from hybrid_rt_bench.report import figures, pictures
 from hybrid_rt_bench.report.table import Table
 from hybrid_rt_bench.report.tables import all_tables
 from hybrid_rt_bench.results import ReportsError, RunData, write_bytes
+
+
+@dataclass(frozen=True)
+class Form:
+    """How runs of one kind are shown.
+
+    Attributes
+    ----------
+    tables : callable
+        Returns the tables of a run, in the order of reading.
+    figures : tuple of callable
+        Each writes pictures of a run into a folder and returns their paths.
+    """
+
+    tables: Callable[[RunData], list[Table]]
+    figures: tuple[Callable[[RunData, Path], list[Path]], ...]
+
+
+FORMS = {"paper": Form(all_tables, (figures.plots, pictures.figures))}
+"""The form of each kind of run."""
 
 
 def render_run(run: RunData) -> tuple[list[Table], list[Path]]:
@@ -22,17 +45,20 @@ def render_run(run: RunData) -> tuple[list[Table], list[Path]]:
     Raises
     ------
     ReportsError
-        The run's folder cannot be written to.
+        The run's folder cannot be written to, or its kind is not known.
     """
-    tables = all_tables(run)
+    if run.kind not in FORMS:
+        raise ReportsError(f"{run.folder}: a run of kind {run.kind!r}, which cannot be shown here")
+    form = FORMS[run.kind]
+    tables = form.tables(run)
     document = _document(run, tables)
     written = [run.folder / "tables.md"]
     write_bytes(written[0], document.encode())
     folder = run.folder / "figures"
     try:
         folder.mkdir(exist_ok=True)
-        written += figures.plots(run, folder)
-        written += pictures.figures(run, folder)
+        for write in form.figures:
+            written += write(run, folder)
     except OSError as error:
         raise ReportsError(f"{folder}: cannot be written ({error.strerror})") from error
     return tables, written
@@ -58,5 +84,9 @@ def _document(run: RunData, tables: list[Table]) -> str:
     failed = [cell for cell in meta["cells"] if cell["state"] == "failed"]
     if failed:
         lines += ["", "Failed:", ""]
-        lines += [f"- {c['scene']}, {c['camera']}: {c['error']}" for c in failed]
+        lines += [f"- {_cell_name(c)}: {c['error']}" for c in failed]
     return "\n".join(lines) + "\n\n" + "\n".join(table.markdown() for table in tables)
+
+
+def _cell_name(cell: dict[str, Any]) -> str:
+    return ", ".join(str(cell[key]) for key in ("scene", "camera", "case") if cell.get(key))

@@ -1,0 +1,16 @@
+"""The kinds of experiments and what runs each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from hybrid_rt_bench.run import Outcome, run_experiment
+
+Runner = Callable[..., Outcome]
+
+RUNNERS: dict[str, Runner] = {"paper": run_experiment}
+"""What runs an experiment of each kind of `hybrid_rt_bench.spec.KINDS`.
+
+A runner takes the experiment and, by name, `reporter`, `threads`, `out`, `command` and those
+options of the command line that its kind knows and that were given.
+"""

@@ -1,0 +1,107 @@
+"""What experiments of every kind say: their names, the sizes of pictures, scenes."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from hybrid_rt.errors import ArgumentError
+
+
+class Resolution(BaseModel):
+    """A picture's size in pixels, written ``1280x720``."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    width: int = Field(ge=1, le=32768)
+    height: int = Field(ge=1, le=32768)
+
+    @classmethod
+    def parse(cls, argument: str, text: str) -> Resolution:
+        """Return the resolution that `text` says.
+
+        Raises
+        ------
+        ArgumentError
+            Anything but ``WIDTHxHEIGHT`` with both in 1 to 32768.
+        """
+        match = re.fullmatch(r"\s*(\d{1,6})\s*[xX×]\s*(\d{1,6})\s*", text)
+        if match:
+            width, height = int(match[1]), int(match[2])
+            if 1 <= width <= 32768 and 1 <= height <= 32768:
+                return cls(width=width, height=height)
+        raise ArgumentError(
+            argument, "WIDTHxHEIGHT in pixels, each 1 to 32768, such as 1280x720", repr(text)
+        )
+
+    def __str__(self) -> str:
+        return f"{self.width}x{self.height}"
+
+
+def _resolution(value: Any) -> Any:
+    return Resolution.parse("resolution", value) if isinstance(value, str) else value
+
+
+ResolutionText = Annotated[Resolution, BeforeValidator(_resolution)]
+
+
+class SceneEntry(BaseModel):
+    """One scene of an experiment.
+
+    Attributes
+    ----------
+    name : str
+        A registered scene, or a path to a mesh file.
+    row : str
+        The row of the paper's tables that it stands beside; empty for none.
+    stand_in : str, optional
+        Built-in scene that takes its place where its files are absent.
+    size : int, optional
+        Number of triangles asked of a built-in scene that has a size.
+    cameras : list of str, optional
+        Default: all of them.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str = Field(min_length=1)
+    row: str = ""
+    stand_in: str | None = None
+    size: int | None = Field(default=None, ge=1)
+    cameras: list[str] | None = Field(default=None, min_length=1)
+
+
+class AnyExperiment(BaseModel):
+    """What an experiment of any kind has; each kind has a class of its own.
+
+    Attributes
+    ----------
+    options : frozenset of str
+        The options of the command line that the kind knows, of ``scenes``, ``cameras``,
+        ``resolutions`` and ``rounds``.
+    kind : str
+        Which class and which runner an experiment belongs to.
+    name, title : str
+    quick : bool
+        Whether the quick form was asked for.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    options: ClassVar[frozenset[str]] = frozenset()
+
+    schema_version: Literal[1] = Field(default=1, alias="schema")
+    kind: str
+    name: str
+    title: str
+    quick: bool = False
+
+    def overridden(self, resolutions: list[Resolution] | None, rounds: int | None) -> Self:
+        """Return the experiment with what the command line changes; None changes nothing."""
+        changes: dict[str, Any] = {}
+        if rounds is not None:
+            changes["rounds"] = rounds
+        if resolutions is not None:
+            changes["resolutions"] = resolutions
+        return self.model_copy(update=changes)
