@@ -13,7 +13,15 @@ from hybrid_rt.io import read_mesh
 from hybrid_rt.lights import AreaLight, DirectionalLight, Light, PointLight
 from hybrid_rt.march import march
 from hybrid_rt.metrics import Judged, Verdict, alpha, by_status, judge, judge_occlusion, rates
-from hybrid_rt.modes import Mode, Paper
+from hybrid_rt.modes import (
+    DEFAULT_THICKNESS,
+    HiZ,
+    Linear,
+    Mode,
+    Paper,
+    PixelDDA,
+    SlopeAware,
+)
 from hybrid_rt.pyramid import build_depth_pyramid
 from hybrid_rt.raster import rasterize
 from hybrid_rt.rate import Rate
@@ -25,6 +33,7 @@ from hybrid_rt.rays import (
     shadow_rays,
 )
 from hybrid_rt.scene import load_scene
+from hybrid_rt.slope_pyramid import build_slope_pyramid
 from hybrid_rt.trace import BruteForceTracer, EmbreeTracer, embree_info, packet_available
 from hybrid_rt.truth import Nearest, Truth
 from hybrid_rt.types import (
@@ -39,11 +48,13 @@ from hybrid_rt.types import (
     OcclusionResult,
     Rays,
     Scene,
+    SlopePyramid,
 )
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "DEFAULT_THICKNESS",
     "AreaLight",
     "ArgumentError",
     "BruteForceTracer",
@@ -53,11 +64,13 @@ __all__ = [
     "EmbreeError",
     "EmbreeTracer",
     "GBuffer",
+    "HiZ",
     "Hits",
     "HybridRTError",
     "HybridResult",
     "Judged",
     "Light",
+    "Linear",
     "MarchStatus",
     "Marched",
     "Mesh",
@@ -66,16 +79,20 @@ __all__ = [
     "Nearest",
     "OcclusionResult",
     "Paper",
+    "PixelDDA",
     "PointLight",
     "Rate",
     "Rays",
     "Scene",
+    "SlopeAware",
+    "SlopePyramid",
     "Truth",
     "UnknownNameError",
     "Verdict",
     "alpha",
     "ambient_occlusion_rays",
     "build_depth_pyramid",
+    "build_slope_pyramid",
     "by_status",
     "diffuse_rays",
     "embree_info",

@@ -210,14 +210,20 @@ def list_() -> None:
     for name in experiment_names():
         table.add_row(name, load_experiment(name).title)
     out.print(table)
-    table = RichTable("technique", "what it does", title="Techniques", title_justify="left")
+    table = RichTable(
+        "technique", "what it does", "default parameters", title="Techniques", title_justify="left"
+    )
     for technique in TECHNIQUES.values():
-        table.add_row(technique.name, technique.description)
+        what = f"{technique.description}\n[dim]{technique.reference}[/dim]"
+        table.add_row(
+            technique.name, what, ", ".join(f"{k} {v}" for k, v in technique.parameters.items())
+        )
     out.print(table)
     table = RichTable("workload", "which rays", title="Workloads", title_justify="left")
     for workload in WORKLOADS.values():
         table.add_row(workload.name, workload.description)
     out.print(table)
+    out.print("Thickness is a share of the diagonal of the scene's bounding box.")
 
 
 @app.command()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -70,20 +71,19 @@ class View:
 
     def screen(self, point: Point) -> Screen:
         """Return what the march of a point reads."""
-        key = (type(point.mode).__name__, point.lists)
-        if key not in self._screens:
-            self._screens[key] = self._make(point)
-        return self._screens[key]
+        kind = "slope" if isinstance(point.mode, hrt.SlopeAware) else "nearest"
+        if (kind, point.lists) not in self._screens:
+            self._screens[kind, point.lists] = self._make(kind, point.lists)
+        return self._screens[kind, point.lists]
 
-    def _make(self, point: Point) -> Screen:
-        pyramid, seconds = _timed(
-            lambda: hrt.build_depth_pyramid(self.gbuffer, threads=self.threads)
-        )
+    def _make(self, kind: str, lists: int) -> Screen:
+        make = hrt.build_slope_pyramid if kind == "slope" else hrt.build_depth_pyramid
+        pyramid, seconds = _timed(lambda: make(self.gbuffer, threads=self.threads))
         return Screen(self.gbuffer, pyramid, seconds)
 
 
 def points_of(technique: Technique, scene: hrt.Scene, *, every: bool) -> list[Point]:
-    """Return the points of a technique, the one of its default parameters first.
+    """Return the points of a technique, the one of its default parameters among them.
 
     Parameters
     ----------
@@ -93,7 +93,21 @@ def points_of(technique: Technique, scene: hrt.Scene, *, every: bool) -> list[Po
     every : bool
         All of them; else the default alone.
     """
-    return [Point(technique.name, "default", technique.mode, default=True)]
+    usual = _in_scene(technique.mode, scene)
+    points = [
+        Point(technique.name, label, mode, default=_in_scene(mode, scene) == usual)
+        for label, mode in technique.points(scene)
+    ]
+    if not any(point.default for point in points):
+        points.insert(0, Point(technique.name, "default", technique.mode, default=True))
+    return points if every else [point for point in points if point.default]
+
+
+def _in_scene(mode: hrt.Mode, scene: hrt.Scene) -> hrt.Mode:
+    """Return a mode with the thickness that it has in a scene, so that modes can be compared."""
+    if isinstance(mode, hrt.Linear | hrt.PixelDDA | hrt.HiZ):
+        return dataclasses.replace(mode, thickness=mode.thickness_in(scene))
+    return mode
 
 
 def _timed(call: Callable[[], Any]) -> tuple[Any, float]:

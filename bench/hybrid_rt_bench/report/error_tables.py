@@ -43,7 +43,7 @@ def table_main(run: RunData) -> Table:
     for (technique, point), pooled in pools(rows, POINT).items():
         table.rows.append(
             [
-                point_name(technique, point),
+                full_name(technique, point, pooled),
                 share(pooled),
                 rate_text(pooled.rate(WRONG)),
                 percent_text(pooled.rate("wrong_primitive")),
@@ -202,7 +202,7 @@ def table_t_error(run: RunData) -> Table:
         if pooled.rows["error_t_p50"].notna().any():
             table.rows.append(
                 [
-                    point_name(technique, point),
+                    full_name(technique, point, pooled),
                     _power(pooled.median("error_t_p50")),
                     _power(pooled.median("error_t_p99")),
                     _power(pooled.largest("error_t_p99")),
@@ -262,8 +262,16 @@ def march_rate(technique: str, pooled: Pooled) -> float:
 
 
 def point_name(technique: str, point: str) -> str:
-    """Return what a point is called."""
-    return technique if point == "default" and technique != EMBREE else f"{technique}, {point}"
+    """Return what one of the defaults is called; Embree has two."""
+    return f"{technique}, {point}" if technique == EMBREE else technique
+
+
+def full_name(technique: str, point: str, pooled: Pooled) -> str:
+    """Return what a point is called among all the points of its technique."""
+    if technique == EMBREE:
+        return f"{technique}, {point}"
+    chosen = bool(pooled.rows.default.iloc[0])
+    return f"{technique}, {point}" + (" (default)" if chosen and point != "default" else "")
 
 
 def share(pooled: Pooled) -> str:

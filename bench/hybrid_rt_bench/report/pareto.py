@@ -184,8 +184,7 @@ def _draw(
     _scale(ax, scale_of or dots, small=small)
     if break_even:
         ax.axhline(1, color="black", lw=1.1, zorder=1)
-    front = pareto([dot.error.value for dot in dots], [dot.worth for dot in dots])
-    steps = [dots[k] for k in front]
+    steps = [dots[k] for k in _front(dots)]
     right = ax.get_xlim()[1]
     ax.step(
         [*(100 * dot.error.value for dot in steps), right],
@@ -194,18 +193,24 @@ def _draw(
         label="Pareto front: nothing is both faster and less wrong",
     )  # fmt: skip
     for technique in dict.fromkeys(dot.technique for dot in dots):
-        mine = sorted((d for d in dots if d.technique == technique), key=lambda d: d.error.value)
+        mine = [dot for dot in dots if dot.technique == technique]
         colour, marker = _look(technique, [dot.technique for dot in dots])
         x = np.array([100 * dot.error.value for dot in mine])
         y = np.array([dot.worth for dot in mine])
+        best = _front(mine)
         if technique != tables.EMBREE:
-            ax.plot(x, y, color=colour, lw=1.3, alpha=0.6, zorder=2)
+            ax.plot(x[best], y[best], color=colour, lw=1.5, alpha=0.7, zorder=2)
         ends = [(100 * dot.error.low, 100 * dot.error.high) for dot in mine]
         spread = np.clip(np.abs(np.array(ends).T - x), 0, None)
         tall = np.abs(np.array([(dot.low, dot.high) for dot in mine]).T - y)
         ax.errorbar(x, y, tall, spread, fmt="none", ecolor=colour, lw=1.1, capsize=2, zorder=2.5)
         size = 4.5 if small else 6
-        ax.plot(x, y, ls="", marker=marker, ms=size, color=colour, zorder=3, label=technique)
+        beaten = [k for k in range(len(mine)) if k not in best]
+        ax.plot(x[beaten], y[beaten], ls="", marker=marker, ms=size, color=colour, alpha=0.35)
+        ax.plot(
+            x[best], y[best], ls="", marker=marker, ms=size, color=colour, zorder=3,
+            label=technique,
+        )  # fmt: skip
         chosen = [k for k, dot in enumerate(mine) if dot.default]
         ax.plot(
             x[chosen], y[chosen], ls="", marker=marker, ms=1.7 * size, color=colour,
@@ -214,6 +219,10 @@ def _draw(
     if not small:
         _hints(ax, break_even=break_even)
         _name(figure, ax, dots)
+
+
+def _front(dots: Sequence[Dot]) -> list[int]:
+    return pareto([dot.error.value for dot in dots], [dot.worth for dot in dots])
 
 
 def _scale(ax: Axes, dots: Sequence[Dot], *, small: bool) -> None:
@@ -253,9 +262,7 @@ def _name(figure: Figure, ax: Axes, dots: Sequence[Dot]) -> None:
     for dot in dots:
         if not dot.default and dot.technique != tables.EMBREE:
             continue
-        text = tables.point_name(dot.technique, "default")
-        if dot.technique == tables.EMBREE:
-            text = f"Embree, {dot.label}"
+        text = f"Embree, {dot.label}" if dot.technique == tables.EMBREE else dot.technique
         if dot.error.count == 0:
             text += f"\n0 of {_count(dot.error.total)} (< {100 * dot.error.high:.1e} %)"
         colour, _ = _look(dot.technique, techniques)
@@ -286,8 +293,8 @@ def _drawn(ax: Axes, dots: Sequence[Dot]) -> list[Bbox]:
     """Return boxes, in pixels, over the dots, their error bars and the lines that join them."""
     lines = [((100 * dot.error.low, dot.worth), (100 * dot.error.high, dot.worth)) for dot in dots]
     for technique in dict.fromkeys(dot.technique for dot in dots if dot.technique != tables.EMBREE):
-        mine = sorted((d for d in dots if d.technique == technique), key=lambda d: d.error.value)
-        places = [(100 * dot.error.value, dot.worth) for dot in mine]
+        mine = [dot for dot in dots if dot.technique == technique]
+        places = [(100 * mine[k].error.value, mine[k].worth) for k in _front(mine)]
         lines += pairwise(places)
     boxes = []
     for dot in dots:
