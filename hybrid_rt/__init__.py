@@ -15,6 +15,7 @@ from hybrid_rt.march import march
 from hybrid_rt.metrics import Judged, Verdict, alpha, by_status, judge, judge_occlusion, rates
 from hybrid_rt.modes import (
     DEFAULT_THICKNESS,
+    Certified,
     HiZ,
     Linear,
     Mode,
@@ -46,6 +47,7 @@ from hybrid_rt.types import (
     MarchStatus,
     Mesh,
     OcclusionResult,
+    PrimitiveLists,
     Rays,
     Scene,
     SlopePyramid,
@@ -59,6 +61,7 @@ __all__ = [
     "ArgumentError",
     "BruteForceTracer",
     "Camera",
+    "Certified",
     "DepthPyramid",
     "DirectionalLight",
     "EmbreeError",
@@ -81,6 +84,7 @@ __all__ = [
     "Paper",
     "PixelDDA",
     "PointLight",
+    "PrimitiveLists",
     "Rate",
     "Rays",
     "Scene",

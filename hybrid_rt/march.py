@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from hybrid_rt import _check, dda, hiz, linear, modes, paper, slope
+from hybrid_rt import _check, certified, dda, hiz, linear, modes, paper, slope
 from hybrid_rt.errors import ArgumentError
-from hybrid_rt.modes import HiZ, Linear, Mode, PixelDDA, SlopeAware
+from hybrid_rt.modes import Certified, HiZ, Linear, Mode, PixelDDA, SlopeAware
 from hybrid_rt.types import DepthPyramid, GBuffer, Marched, Pyramid, Rays, SlopePyramid
 
 
@@ -28,9 +28,9 @@ def march(
     pyramid : DepthPyramid or SlopePyramid
         Of `gbuffer`. A SlopePyramid is for mode "slope" only, which makes its own, within the call,
         where it gets a DepthPyramid.
-    mode : {"paper", "linear", "dda", "hiz", "slope"} or a mode object
-        The technique, one of `Paper`, `Linear`, `PixelDDA`, `HiZ`, `SlopeAware`; see
-        `hybrid_rt.modes`. A name stands for its default parameters.
+    mode : {"paper", "linear", "dda", "hiz", "slope", "certified"} or a mode object
+        The technique, one of `Paper`, `Linear`, `PixelDDA`, `HiZ`, `SlopeAware`,
+        `Certified`; see `hybrid_rt.modes`. A name stands for its default parameters.
     any_hit : bool
         Whether any hit answers a ray and not only its nearest. For techniques whose first hit is
         their answer, all but "certified", this changes nothing.
@@ -65,6 +65,10 @@ def march(
     if isinstance(chosen, SlopeAware):
         return slope.march(rays, gbuffer, pyramid, chosen, threads)
     assert isinstance(pyramid, DepthPyramid)
+    if isinstance(chosen, Certified):
+        return certified.march(rays, gbuffer, pyramid, chosen, any_hit, threads)
+    if pyramid.conservative:
+        raise ArgumentError("pyramid", "one of the depths at pixel centres", "a conservative one")
     if isinstance(chosen, Linear):
         return linear.march(rays, gbuffer, pyramid, chosen, threads)
     if isinstance(chosen, PixelDDA):

@@ -9,7 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import hybrid_rt as hrt
+from hybrid_rt.certified import LENGTH
 from hybrid_rt_bench.techniques import Technique
+
+LISTS = (2, 4, LENGTH, 16)
+"""Lengths of the lists of primitives a pixel with which "certified" is measured."""
 
 
 @dataclass(frozen=True)
@@ -67,19 +71,28 @@ class View:
         self.gbuffer, self.raster_seconds = _timed(
             lambda: hrt.rasterize(scene, camera, threads=threads)
         )
-        self._screens: dict[tuple[str, int], Screen] = {}
+        self._screens: dict[tuple[type | None, int], Screen] = {}
 
     def screen(self, point: Point) -> Screen:
         """Return what the march of a point reads."""
-        kind = "slope" if isinstance(point.mode, hrt.SlopeAware) else "nearest"
+        kind = type(point.mode) if point.lists or isinstance(point.mode, hrt.SlopeAware) else None
         if (kind, point.lists) not in self._screens:
-            self._screens[kind, point.lists] = self._make(kind, point.lists)
+            self._screens[kind, point.lists] = self._make(point)
         return self._screens[kind, point.lists]
 
-    def _make(self, kind: str, lists: int) -> Screen:
-        make = hrt.build_slope_pyramid if kind == "slope" else hrt.build_depth_pyramid
-        pyramid, seconds = _timed(lambda: make(self.gbuffer, threads=self.threads))
-        return Screen(self.gbuffer, pyramid, seconds)
+    def _make(self, point: Point) -> Screen:
+        threads = self.threads
+        if isinstance(point.mode, hrt.Certified):
+            start = time.perf_counter()
+            gbuffer = hrt.rasterize(self.scene, self.camera, lists=point.lists, threads=threads)
+            pyramid = hrt.build_depth_pyramid(gbuffer, conservative=True, threads=threads)
+            # What a renderer has anyway, the visible surface, is not a cost of the technique.
+            seconds = time.perf_counter() - start - self.raster_seconds
+            return Screen(gbuffer, pyramid, seconds)
+        slope = isinstance(point.mode, hrt.SlopeAware)
+        make = hrt.build_slope_pyramid if slope else hrt.build_depth_pyramid
+        built, seconds = _timed(lambda: make(self.gbuffer, threads=threads))
+        return Screen(self.gbuffer, built, seconds)
 
 
 def points_of(technique: Technique, scene: hrt.Scene, *, every: bool) -> list[Point]:
@@ -98,6 +111,12 @@ def points_of(technique: Technique, scene: hrt.Scene, *, every: bool) -> list[Po
         Point(technique.name, label, mode, default=_in_scene(mode, scene) == usual)
         for label, mode in technique.points(scene)
     ]
+    if isinstance(technique.mode, hrt.Certified):
+        points = [
+            dataclasses.replace(point, label=f"lists {lists}", default=lists == LENGTH, lists=lists)
+            for point in points
+            for lists in LISTS
+        ]
     if not any(point.default for point in points):
         points.insert(0, Point(technique.name, "default", technique.mode, default=True))
     return points if every else [point for point in points if point.default]
