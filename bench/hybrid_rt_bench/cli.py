@@ -87,15 +87,18 @@ def run(
 ) -> None:
     """Measure an experiment and write its tables and figures.
 
-    Every cell (scene x camera x resolution) is measured in interleaved rounds and kept as soon as
-    it is finished: Ctrl-C, or a cell that fails, costs only itself. The run's folder is
-    `reports/<date>-<time>-<experiment>`; `hybrid-rt report` renders it again at any time.
+    Every cell (scene x camera x resolution, and what else the experiment says) is measured in
+    interleaved rounds and kept as soon as it is finished: Ctrl-C, or a cell that fails, costs only
+    itself. The run's folder is `reports/<date>-<time>-<experiment>`; `hybrid-rt report` renders it
+    again at any time.
 
     Examples
     --------
     * `hybrid-rt run paper --quick` - a few minutes, nothing to download
 
     * `hybrid-rt run paper` - the whole experiment, on real scenes where they are found
+
+    * `hybrid-rt run error --quick` - speed against error of every technique
 
     * `hybrid-rt run paper --scenes sponza --cameras nave --resolutions 1920x1080 --rounds 15`
 
