@@ -12,10 +12,20 @@ from hybrid_rt.hybrid import occluded_hybrid, trace_hybrid
 from hybrid_rt.io import read_mesh
 from hybrid_rt.lights import AreaLight, DirectionalLight, Light, PointLight
 from hybrid_rt.march import march
-from hybrid_rt.metrics import Judged, Rate, Verdict, alpha, by_status, judge, rates
-from hybrid_rt.modes import Certified, Mode, Paper
+from hybrid_rt.metrics import Judged, Verdict, alpha, by_status, judge, judge_occlusion, rates
+from hybrid_rt.modes import (
+    DEFAULT_THICKNESS,
+    Certified,
+    HiZ,
+    Linear,
+    Mode,
+    Paper,
+    PixelDDA,
+    SlopeAware,
+)
 from hybrid_rt.pyramid import build_depth_pyramid
 from hybrid_rt.raster import rasterize
+from hybrid_rt.rate import Rate
 from hybrid_rt.rays import (
     ambient_occlusion_rays,
     diffuse_rays,
@@ -24,6 +34,7 @@ from hybrid_rt.rays import (
     shadow_rays,
 )
 from hybrid_rt.scene import load_scene
+from hybrid_rt.slope_pyramid import build_slope_pyramid
 from hybrid_rt.trace import BruteForceTracer, EmbreeTracer, embree_info, packet_available
 from hybrid_rt.truth import Nearest, Truth
 from hybrid_rt.types import (
@@ -39,11 +50,13 @@ from hybrid_rt.types import (
     PrimitiveLists,
     Rays,
     Scene,
+    SlopePyramid,
 )
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "DEFAULT_THICKNESS",
     "AreaLight",
     "ArgumentError",
     "BruteForceTracer",
@@ -54,11 +67,13 @@ __all__ = [
     "EmbreeError",
     "EmbreeTracer",
     "GBuffer",
+    "HiZ",
     "Hits",
     "HybridRTError",
     "HybridResult",
     "Judged",
     "Light",
+    "Linear",
     "MarchStatus",
     "Marched",
     "Mesh",
@@ -67,22 +82,27 @@ __all__ = [
     "Nearest",
     "OcclusionResult",
     "Paper",
+    "PixelDDA",
     "PointLight",
     "PrimitiveLists",
     "Rate",
     "Rays",
     "Scene",
+    "SlopeAware",
+    "SlopePyramid",
     "Truth",
     "UnknownNameError",
     "Verdict",
     "alpha",
     "ambient_occlusion_rays",
     "build_depth_pyramid",
+    "build_slope_pyramid",
     "by_status",
     "diffuse_rays",
     "embree_info",
     "glossy_rays",
     "judge",
+    "judge_occlusion",
     "load_scene",
     "march",
     "mirror_rays",

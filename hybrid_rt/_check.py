@@ -126,6 +126,24 @@ def real(
     return x
 
 
+def fraction(argument: str, value: Any) -> float:
+    """Return `value` as a float from 0 to 1, both included."""
+    expected = "a number from 0 to 1"
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise ArgumentError(argument, expected, describe(value))
+    x = float(value)
+    if not 0.0 <= x <= 1.0:
+        raise ArgumentError(argument, expected, describe(value))
+    return x
+
+
+def boolean(argument: str, value: Any) -> bool:
+    """Return `value` if it is True or False."""
+    if not isinstance(value, bool):
+        raise ArgumentError(argument, "True or False", describe(value))
+    return value
+
+
 def integer(argument: str, value: Any, *, least: int, most: int | None = None) -> int:
     """Return `value` as an int of at least `least` and at most `most`."""
     expected = f"an integer >= {least}" + (f" and <= {most}" if most is not None else "")

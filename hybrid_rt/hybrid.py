@@ -15,12 +15,12 @@ from hybrid_rt.modes import Certified, Mode
 from hybrid_rt.types import (
     I64,
     Bool,
-    DepthPyramid,
     GBuffer,
     Hits,
     HybridResult,
     Marched,
     OcclusionResult,
+    Pyramid,
     Rays,
 )
 
@@ -46,7 +46,7 @@ class OcclusionTracer(Protocol):
 def trace_hybrid(
     rays: Rays,
     gbuffer: GBuffer,
-    pyramid: DepthPyramid,
+    pyramid: Pyramid,
     tracer: Tracer,
     mode: str | Mode = "paper",
     *,
@@ -59,8 +59,8 @@ def trace_hybrid(
     rays : Rays
         N rays, world.
     gbuffer : GBuffer
-    pyramid : DepthPyramid
-        Of `gbuffer`.
+    pyramid : DepthPyramid or SlopePyramid
+        Of `gbuffer`; as in `march`.
     tracer : Tracer
         An `EmbreeTracer`, a `BruteForceTracer` or anything with their `intersect`, over the scene
         of `gbuffer`.
@@ -117,7 +117,7 @@ def trace_hybrid(
 def occluded_hybrid(
     rays: Rays,
     gbuffer: GBuffer,
-    pyramid: DepthPyramid,
+    pyramid: Pyramid,
     tracer: OcclusionTracer,
     mode: str | Mode = "paper",
     *,
@@ -130,7 +130,7 @@ def occluded_hybrid(
     rays : Rays
         N rays, world; any hit with ``t_near <= t <= t_far`` occludes.
     gbuffer : GBuffer
-    pyramid : DepthPyramid
+    pyramid : DepthPyramid or SlopePyramid
         Of `gbuffer`.
     tracer : OcclusionTracer
         An `EmbreeTracer`, a `BruteForceTracer` or anything with their `occluded`, over the scene of

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from hybrid_rt import _check, certified, modes, paper
+from hybrid_rt import _check, certified, dda, hiz, linear, modes, paper, slope
 from hybrid_rt.errors import ArgumentError
-from hybrid_rt.modes import Certified, Mode
-from hybrid_rt.types import DepthPyramid, GBuffer, Marched, Rays
+from hybrid_rt.modes import Certified, HiZ, Linear, Mode, PixelDDA, SlopeAware
+from hybrid_rt.types import DepthPyramid, GBuffer, Marched, Pyramid, Rays, SlopePyramid
 
 
 def march(
     rays: Rays,
     gbuffer: GBuffer,
-    pyramid: DepthPyramid,
+    pyramid: Pyramid,
     mode: str | Mode = "paper",
     *,
     any_hit: bool = False,
@@ -25,13 +25,15 @@ def march(
         N rays, world. A ray whose `pixel` is the pixel it starts in is taken to start on the
         surface visible there.
     gbuffer : GBuffer
-    pyramid : DepthPyramid
-        Of `gbuffer`.
-    mode : {"paper", "certified"} or a mode object
-        The technique; see `hybrid_rt.modes`. A name stands for its default parameters.
+    pyramid : DepthPyramid or SlopePyramid
+        Of `gbuffer`. A SlopePyramid is for mode "slope" only, which makes its own, within the call,
+        where it gets a DepthPyramid.
+    mode : {"paper", "linear", "dda", "hiz", "slope", "certified"} or a mode object
+        The technique, one of `Paper`, `Linear`, `PixelDDA`, `HiZ`, `SlopeAware`,
+        `Certified`; see `hybrid_rt.modes`. A name stands for its default parameters.
     any_hit : bool
-        Whether any hit answers a ray and not only its nearest. For "paper", whose first hit is its
-        answer, this changes nothing.
+        Whether any hit answers a ray and not only its nearest. For techniques whose first hit is
+        their answer, all but "certified", this changes nothing.
     threads : int, optional
         Default: as many as Numba is set to.
 
@@ -43,21 +45,43 @@ def march(
     Raises
     ------
     ArgumentError
-        A pyramid of another size than the G-buffer, an unknown mode.
+        A pyramid of another size than the G-buffer or of the wrong kind, an unknown mode.
 
     Notes
     -----
     In mode "paper" free space is proven at pixel centres only, so 0.5 to 2 % of the answers are
-    wrong by more than a pixel (``hybrid-rt run paper`` measures the rate).
+    wrong by more than a pixel (``hybrid-rt run paper`` measures the rate). "slope" proves it over
+    whole pixels, but only for the planes that the pixels show. "linear", "dda" and "hiz" guess a
+    thickness, and are wrong wherever it is; "hiz" also answers rays with a miss.
 
     The same bits come out for any number of threads and any order of the rays. The inner loop
     computes in float32 from a float64 set-up.
     """
     _check.instance("rays", rays, Rays)
     _check.instance("gbuffer", gbuffer, GBuffer)
-    _check.instance("pyramid", pyramid, DepthPyramid)
     _check.choice("any_hit", any_hit, (True, False))
     chosen = modes.named(mode)
+    _check_pyramid(pyramid, gbuffer, chosen)
+    if isinstance(chosen, SlopeAware):
+        return slope.march(rays, gbuffer, pyramid, chosen, threads)
+    assert isinstance(pyramid, DepthPyramid)
+    if isinstance(chosen, Certified):
+        return certified.march(rays, gbuffer, pyramid, chosen, any_hit, threads)
+    if pyramid.conservative:
+        raise ArgumentError("pyramid", "one of the depths at pixel centres", "a conservative one")
+    if isinstance(chosen, Linear):
+        return linear.march(rays, gbuffer, pyramid, chosen, threads)
+    if isinstance(chosen, PixelDDA):
+        return dda.march(rays, gbuffer, pyramid, chosen, threads)
+    if isinstance(chosen, HiZ):
+        return hiz.march(rays, gbuffer, pyramid, chosen, threads)
+    return paper.march(rays, gbuffer, pyramid, chosen, threads)
+
+
+def _check_pyramid(pyramid: Pyramid, gbuffer: GBuffer, mode: Mode) -> None:
+    """Raise unless `pyramid` is one that `mode` can go through, and of the size of `gbuffer`."""
+    if not (isinstance(mode, SlopeAware) and isinstance(pyramid, SlopePyramid)):
+        _check.instance("pyramid", pyramid, DepthPyramid)
     height, width = gbuffer.depth.shape
     if (pyramid.heights[0], pyramid.widths[0]) != (height, width):
         raise ArgumentError(
@@ -65,8 +89,3 @@ def march(
             f"the pyramid of the G-buffer, {width} by {height} pixels at level 0",
             f"one of {pyramid.widths[0]} by {pyramid.heights[0]}",
         )
-    if isinstance(chosen, Certified):
-        return certified.march(rays, gbuffer, pyramid, chosen, any_hit, threads)
-    if pyramid.conservative:
-        raise ArgumentError("pyramid", "one of the depths at pixel centres", "a conservative one")
-    return paper.march(rays, gbuffer, pyramid, chosen, threads)

@@ -45,11 +45,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from hybrid_rt import _check
 from hybrid_rt.camera import project
 from hybrid_rt.errors import ArgumentError
+from hybrid_rt.rate import Rate
 from hybrid_rt.truth import MISSED, Truth
 from hybrid_rt.types import F32, F64, I32, U8, Bool, Camera, Hits, MarchStatus, Rays, Scene
 
@@ -174,11 +174,7 @@ def judge(
     tolerance = _check.real("pixel_tolerance", pixel_tolerance, above=0.0)
 
     _check.choice("every", every, (True, False))
-    if truth is None:
-        truth = Truth(scene)
-    _check.instance("truth", truth, Truth)
-    if truth.scene is not scene:
-        raise ArgumentError("truth", "a Truth of `scene`", f"one of scene {truth.scene.name!r}")
+    truth = _truth_of(scene, truth)
 
     judged = Judged(
         np.full(n, Verdict.UNRESOLVED, np.uint8),
@@ -212,6 +208,82 @@ def judge(
     judged.error_t[at], judged.error_px[at] = error_t, error_px
     judged.reference_wrong[at] = ~reference_right
     return judged
+
+
+def judge_occlusion(
+    rays: Rays,
+    claimed: Any,
+    resolved: Any,
+    reference: Any,
+    scene: Scene,
+    *,
+    truth: Truth | None = None,
+) -> Judged:
+    """Return what is right and what is wrong in the answers to any-hit queries.
+
+    Parameters
+    ----------
+    rays : Rays
+        N rays; a hit with ``t_near <= t <= t_far`` occludes.
+    claimed : (N,) array_like of bool
+        Which rays are said to be occluded; those of unresolved rays are not looked at.
+    resolved : (N,) array_like of bool
+        The rays that the technique answers.
+    reference : (N,) array_like of bool
+        The answers of a robust tracer.
+    scene : Scene
+        What was traced.
+    truth : Truth, optional
+        As in `judge`.
+
+    Returns
+    -------
+    Judged
+        The verdicts UNRESOLVED, CORRECT, TIE, FALSE_HIT (occluded is claimed, and nothing is hit or
+        grazed), FALSE_MISS (free is claimed, and something is hit) and REFERENCE_WRONG. A ray that
+        grazes and hits nothing may be called either. No primitive and no place is claimed, so both
+        errors are NaN.
+
+    Raises
+    ------
+    ArgumentError
+        Arrays of different lengths, or a truth of another scene.
+    """
+    _check.instance("rays", rays, Rays)
+    _check.instance("scene", scene, Scene)
+    n = len(rays)
+    flags = []
+    for name, value in (("claimed", claimed), ("resolved", resolved), ("reference", reference)):
+        flag = _check.array(name, value, ("N",), np.bool_)
+        _check.same_length(name, flag, "rays", n)
+        flags.append(flag)
+    claim, answered, ref = flags
+    truth = _truth_of(scene, truth)
+    verdict = np.where(answered, Verdict.CORRECT, Verdict.UNRESOLVED).astype(np.uint8)
+    reference_wrong = np.zeros(n, np.bool_)
+    at = np.flatnonzero(answered & (claim != ref))
+    nearest = truth.nearest(rays.take(at))
+    hit = nearest.prim_id >= 0
+    either = ~hit & np.isfinite(nearest.t_grazed)
+    claim_right, reference_right = either | (claim[at] == hit), either | (ref[at] == hit)
+    verdict[at] = np.select(
+        [claim_right & reference_right, claim_right, claim[at]],
+        [Verdict.TIE, Verdict.REFERENCE_WRONG, Verdict.FALSE_HIT],
+        Verdict.FALSE_MISS,
+    )
+    reference_wrong[at] = ~reference_right
+    nothing = np.full(n, np.nan)
+    return Judged(verdict, nothing, nothing.copy(), reference_wrong, 1.0)
+
+
+def _truth_of(scene: Scene, truth: Truth | None) -> Truth:
+    """Return a truth of `scene`: the one given, if it is."""
+    if truth is None:
+        return Truth(scene)
+    _check.instance("truth", truth, Truth)
+    if truth.scene is not scene:
+        raise ArgumentError("truth", "a Truth of `scene`", f"one of scene {truth.scene.name!r}")
+    return truth
 
 
 def _hold(
@@ -274,43 +346,6 @@ def _screen(rays: Rays, t: F64, camera: Camera) -> tuple[F64, Bool]:
     points = rays.origin.astype(np.float64) + t[:, None] * rays.direction.astype(np.float64)
     xy_depth = project(camera, points)
     return xy_depth[:, :2], (xy_depth[:, 2] > 0) & np.isfinite(xy_depth).all(axis=1)
-
-
-@dataclass(frozen=True)
-class Rate:
-    """A share, with an interval for what it estimates.
-
-    Attributes
-    ----------
-    count, total : int
-    low, high : float
-        Exact 95 % interval (Clopper and Pearson 1934). For a count of zero `high` is the rule of
-        three, ``3 / total``: what has never been seen in that many rays is, at 95 %, no more
-        frequent. For no rays at all it is 0 to 1.
-    """
-
-    count: int
-    total: int
-    low: float
-    high: float
-
-    @classmethod
-    def of(cls, count: int, total: int) -> Rate:
-        """Return the rate of `count` in `total`."""
-        total = _check.integer("total", total, least=0)
-        count = _check.integer("count", count, least=0, most=total)
-        if total == 0:
-            return cls(0, 0, 0.0, 1.0)
-        if count == 0:
-            return cls(0, total, 0.0, min(1.0, 3.0 / total))
-        low = float(stats.beta.ppf(0.025, count, total - count + 1))
-        high = float(stats.beta.ppf(0.975, count + 1, total - count)) if count < total else 1.0
-        return cls(count, total, low, high)
-
-    @property
-    def value(self) -> float:
-        """``count / total``; NaN for no rays."""
-        return self.count / self.total if self.total else float("nan")
 
 
 def alpha(resolved: Any) -> Rate:

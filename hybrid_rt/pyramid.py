@@ -7,7 +7,7 @@ import numpy as np
 from hybrid_rt import _check, _threads
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels import pyramid as kernels
-from hybrid_rt.types import DepthPyramid, GBuffer
+from hybrid_rt.types import I64, DepthPyramid, GBuffer
 
 
 def build_depth_pyramid(
@@ -55,14 +55,19 @@ def build_depth_pyramid(
             )
         depth = np.ascontiguousarray(gbuffer.lists.nearest[:, :, 0])
     height, width = depth.shape
+    offsets, widths, heights = layout(width, height)
+    data = np.empty(int(offsets[-1]) + 1, np.float32)
+    with _threads.limited(threads):
+        kernels.build(depth, offsets, widths, heights, data)
+    return DepthPyramid(data, offsets, widths, heights, conservative)
+
+
+def layout(width: int, height: int) -> tuple[I64, I64, I64]:
+    """Return offsets, widths and heights, (L,) int64, of the levels of a pyramid."""
     sizes = [(width, height)]
     while sizes[-1] != (1, 1):
         w, h = sizes[-1]
         sizes.append((-(-w // 2), -(-h // 2)))
     widths, heights = np.array(sizes, np.int64).T.copy()
     cells = widths * heights
-    offsets = np.cumsum(cells) - cells
-    data = np.empty(int(cells.sum()), np.float32)
-    with _threads.limited(threads):
-        kernels.build(depth, offsets, widths, heights, data)
-    return DepthPyramid(data, offsets, widths, heights, conservative)
+    return np.cumsum(cells) - cells, widths, heights

@@ -150,6 +150,12 @@ class Scene:
         used = self.vertices[self.faces.ravel()].astype(np.float64)
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
+    @cached_property
+    def diagonal(self) -> float:
+        """Length of the bounding box's diagonal, world units: what a scene's lengths relate to."""
+        low, high = self.bounds
+        return float(np.linalg.norm(high - low))
+
     def __len__(self) -> int:
         return len(self.faces)
 
@@ -377,6 +383,43 @@ class DepthPyramid:
         n = _check.integer("index", index, least=0, most=len(self) - 1)
         start, w, h = int(self.offsets[n]), int(self.widths[n]), int(self.heights[n])
         return self.data[start : start + w * h].reshape(h, w)
+
+
+@dataclass(frozen=True, eq=False)
+class SlopePyramid:
+    """For 1, 4, 16 ... pixels, a plane in front of all their tilted planes; as a DepthPyramid lies.
+
+    The plane of cell (i, j) of level l is ``a + b_x (x - x_c) + b_y (y - y_c)`` with the cell's
+    centre ``x_c = (i + 1/2) 2**l``, ``y_c = (j + 1/2) 2**l``. Over the square of each pixel in the
+    cell it is nowhere farther than that pixel's own plane; level 0 is those planes. Where nothing
+    is visible in the whole cell, a is minus infinity and the slopes are 0.
+
+    Attributes
+    ----------
+    data : (sum of all cells, 3) float32
+        a, b_x, b_y, in depth and depth a pixel; all levels, row by row, one after the other.
+    offsets : (L,) int64
+        Index of the first cell of each level in `data`.
+    widths, heights : (L,) int64
+    """
+
+    data: F32
+    offsets: I64
+    widths: I64
+    heights: I64
+
+    def __len__(self) -> int:
+        return len(self.offsets)
+
+    def level(self, index: int) -> F32:
+        """Return level `index` as a (height, width, 3) view of `data`."""
+        n = _check.integer("index", index, least=0, most=len(self) - 1)
+        start, w, h = int(self.offsets[n]), int(self.widths[n]), int(self.heights[n])
+        return self.data[start : start + w * h].reshape(h, w, 3)
+
+
+Pyramid = DepthPyramid | SlopePyramid
+"""What a march goes through."""
 
 
 @dataclass(frozen=True, eq=False)

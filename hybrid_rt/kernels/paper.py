@@ -14,13 +14,13 @@ from hybrid_rt.kernels.screen import (
     HALF,
     HIDDEN,
     HIT,
-    MISS,
     OFFSCREEN,
     axis,
     clamp,
     edge_s,
-    ray_t,
+    next_cell,
     screen_ray,
+    write_row,
 )
 
 
@@ -116,20 +116,10 @@ def march_ray(
                 s = s_exit
             if s_exit >= s_end:
                 return status, -1, -1, F0, s_end, steps
-            if sx < sy:
-                from_x = True
-                cx = edge_x if step_x > 0 else edge_x - 1
-                along = int(y + dy * s)
-                low = cy if step_y > 0 else ly << level
-                high = cy if step_y < 0 else ((ly + 1) << level) - 1
-                cy = clamp(along, low, high)
-            else:
-                from_x = False
-                cy = edge_y if step_y > 0 else edge_y - 1
-                along = int(x + dx * s)
-                low = cx if step_x > 0 else lx << level
-                high = cx if step_x < 0 else ((lx + 1) << level) - 1
-                cx = clamp(along, low, high)
+            from_x = sx < sy
+            cx, cy = next_cell(
+                cx, cy, lx, ly, level, edge_x, edge_y, sx, sy, s, x, y, dx, dy, step_x, step_y
+            )
             if cx < 0 or cy < 0 or cx >= width or cy >= height:
                 return OFFSCREEN, -1, -1, F0, s, steps
         if not blocked:
@@ -198,11 +188,10 @@ def march_chunk(
     """Set up rays in float64, march them in float32 and write their rows of the outputs."""
     height, width = depth.shape
     for i in range(first, last):
-        start = np.float64(t_near[i])
         end, x, y, z0, dx, dy, dz, s_end, z, gz = screen_ray(
             np.float64(origin[i, 0]), np.float64(origin[i, 1]), np.float64(origin[i, 2]),
             np.float64(direction[i, 0]), np.float64(direction[i, 1]), np.float64(direction[i, 2]),
-            start, np.float64(t_far[i]), m, eye, near, width, height,
+            np.float64(t_near[i]), np.float64(t_far[i]), m, eye, near, width, height,
         )  # fmt: skip
         how, hit_x, hit_y, s_hit, s_free, count = end, -1, -1, F0, F0, 0
         if s_end >= 0.0:
@@ -212,20 +201,10 @@ def march_chunk(
                 ray_pixel[i, 0], ray_pixel[i, 1], depth, ddx, ddy,
                 cells, offsets, widths, samples, max_steps, steps_by_level,
             )  # fmt: skip
-        status[i] = how
-        resolved[i] = how == HIT
-        pixel[i, 0] = hit_x
-        pixel[i, 1] = hit_y
-        steps[i] = count
-        t_free[i] = t_far[i] if how == MISS else ray_t(np.float64(s_free), z, gz, start)
-        if s_end < 0.0:
-            t_free[i] = 0.0
-        if how == HIT:
-            prim[i] = prim_id[hit_y, hit_x]
-            t[i] = ray_t(np.float64(s_hit), z, gz, start)
-        else:
-            prim[i] = -1
-            t[i] = np.inf
+        write_row(
+            i, how, how == HIT, hit_x, hit_y, s_hit, s_free, count, s_end >= 0.0, z, gz,
+            t_near, t_far, prim_id, status, resolved, pixel, prim, t, t_free, steps,
+        )  # fmt: skip
 
 
 @parallel_kernel

@@ -113,3 +113,53 @@ def edge_s(edge, start, inv, bias):
 def clamp(value, low, high):
     """Return `value` limited to [low, high]."""
     return low if value < low else (high if value > high else value)
+
+
+@inlined
+def next_cell(
+    cx, cy, lx, ly, level, edge_x, edge_y, sx, sy, s, x, y, dx, dy, step_x, step_y
+):  # fmt: skip
+    """Return the pixel in which a ray at s enters the next cell of a level from cell (lx, ly).
+
+    (cx, cy) is the pixel in which the ray entered this cell, (edge_x, edge_y) its far edges, which
+    the ray reaches at sx and sy.
+    """
+    if sx < sy:
+        low = cy if step_y > 0 else ly << level
+        high = cy if step_y < 0 else ((ly + 1) << level) - 1
+        return (edge_x if step_x > 0 else edge_x - 1), clamp(int(y + dy * s), low, high)
+    low = cx if step_x > 0 else lx << level
+    high = cx if step_x < 0 else ((lx + 1) << level) - 1
+    return clamp(int(x + dx * s), low, high), (edge_y if step_y > 0 else edge_y - 1)
+
+
+@inlined
+def slab_bottom(depth, thickness):
+    """Return the depth at `thickness`, in units of the near plane's distance, behind `depth`.
+
+    ``near / (z_view + thickness)`` for ``depth = near / z_view``.
+    """
+    return depth / (F1 + depth * thickness)
+
+
+@inlined
+def write_row(
+    i, how, answers, hit_x, hit_y, s_hit, s_free, count, started, z, gz, t_near, t_far, prim_id,
+    status, resolved, pixel, prim, t, t_free, steps,
+):  # fmt: skip
+    """Write row i of a march's outputs; hit_x is -1 where no pixel answers the ray with a hit."""
+    start = np.float64(t_near[i])
+    status[i] = how
+    resolved[i] = answers
+    pixel[i, 0] = hit_x
+    pixel[i, 1] = hit_y
+    steps[i] = count
+    t_free[i] = t_far[i] if how == MISS else ray_t(np.float64(s_free), z, gz, start)
+    if not started:
+        t_free[i] = 0.0
+    if hit_x >= 0:
+        prim[i] = prim_id[hit_y, hit_x]
+        t[i] = ray_t(np.float64(s_hit), z, gz, start)
+    else:
+        prim[i] = -1
+        t[i] = np.inf

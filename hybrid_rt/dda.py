@@ -1,0 +1,48 @@
+"""The perspective-correct pixel DDA with a thickness."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid_rt import _threads
+from hybrid_rt.kernels import dda as kernels
+from hybrid_rt.modes import PixelDDA
+from hybrid_rt.types import DepthPyramid, GBuffer, Marched, Rays
+
+
+def march(
+    rays: Rays, gbuffer: GBuffer, pyramid: DepthPyramid, mode: PixelDDA, threads: int | None
+) -> Marched:
+    """Return what `PixelDDA` says about each ray; `hybrid_rt.march` has checked the arguments."""
+    height, width = gbuffer.depth.shape
+    max_steps = width + height + 2 if mode.max_steps is None else mode.max_steps
+    marched = Marched.unfilled(len(rays), len(pyramid))
+    with _threads.limited(threads) as workers:
+        kernels.march(
+            workers,
+            rays.origin,
+            rays.direction,
+            rays.pixel,
+            rays.t_near,
+            rays.t_far,
+            gbuffer.depth,
+            gbuffer.prim_id,
+            gbuffer.camera.pixel_from_world,
+            np.array(gbuffer.camera.eye),
+            gbuffer.camera.near,
+            mode.thickness_in(gbuffer.scene),
+            mode.stride,
+            float(mode.jitter),
+            max_steps,
+            marched.status,
+            marched.resolved,
+            marched.pixel,
+            marched.prim_id,
+            marched.t,
+            marched.t_free,
+            marched.steps,
+        )
+    # Every sample is of the depth buffer itself.
+    marched.steps_by_level[:] = 0
+    marched.steps_by_level[0] = marched.steps.sum(dtype=np.int64)
+    return marched

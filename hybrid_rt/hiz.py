@@ -1,0 +1,53 @@
+"""The hierarchical-Z march with a thickness, a vignette and a confidence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid_rt import _threads
+from hybrid_rt.kernels import hiz as kernels
+from hybrid_rt.modes import HiZ
+from hybrid_rt.types import DepthPyramid, GBuffer, Marched, Rays
+
+
+def march(
+    rays: Rays, gbuffer: GBuffer, pyramid: DepthPyramid, mode: HiZ, threads: int | None
+) -> Marched:
+    """Return what `HiZ` says about each ray; `hybrid_rt.march` has checked the arguments."""
+    marched = Marched.unfilled(len(rays), len(pyramid))
+    with _threads.limited(threads) as workers:
+        steps_by_level = np.zeros((workers, len(pyramid)), np.int64)
+        kernels.march(
+            workers,
+            rays.origin,
+            rays.direction,
+            rays.pixel,
+            rays.t_near,
+            rays.t_far,
+            gbuffer.depth,
+            gbuffer.ddx,
+            gbuffer.ddy,
+            gbuffer.prim_id,
+            pyramid.data,
+            pyramid.offsets,
+            pyramid.widths,
+            gbuffer.camera.pixel_from_world,
+            np.array(gbuffer.camera.eye),
+            gbuffer.camera.near,
+            mode.thickness_in(gbuffer.scene),
+            float(mode.threshold),
+            float(mode.border),
+            mode.exhausted_hits,
+            mode.trace_background,
+            mode.max_steps,
+            marched.status,
+            marched.resolved,
+            marched.pixel,
+            marched.prim_id,
+            marched.t,
+            marched.t_free,
+            marched.steps,
+            steps_by_level,
+        )
+    steps_by_level.sum(axis=0, out=marched.steps_by_level)
+    return marched

@@ -1,0 +1,54 @@
+"""The paper's march through planes that bound tilted pixels."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid_rt import _threads
+from hybrid_rt.kernels import slope as kernels
+from hybrid_rt.modes import SlopeAware
+from hybrid_rt.slope_pyramid import build_slope_pyramid
+from hybrid_rt.types import GBuffer, Marched, Pyramid, Rays, SlopePyramid
+
+
+def march(
+    rays: Rays, gbuffer: GBuffer, pyramid: Pyramid, mode: SlopeAware, threads: int | None
+) -> Marched:
+    """Return what `SlopeAware` says about each ray; `hybrid_rt.march` has checked the arguments.
+
+    A `DepthPyramid` has no slopes: the planes are then built from the G-buffer, in this call.
+    """
+    height, width = gbuffer.depth.shape
+    max_steps = 2 * (width + height) + 2 if mode.max_steps is None else mode.max_steps
+    if not isinstance(pyramid, SlopePyramid):
+        pyramid = build_slope_pyramid(gbuffer, threads=threads)
+    marched = Marched.unfilled(len(rays), len(pyramid))
+    with _threads.limited(threads) as workers:
+        steps_by_level = np.zeros((workers, len(pyramid)), np.int64)
+        kernels.march(
+            workers,
+            rays.origin,
+            rays.direction,
+            rays.pixel,
+            rays.t_near,
+            rays.t_far,
+            gbuffer.prim_id,
+            pyramid.data,
+            pyramid.offsets,
+            pyramid.widths,
+            gbuffer.camera.pixel_from_world,
+            np.array(gbuffer.camera.eye),
+            gbuffer.camera.near,
+            mode.samples,
+            max_steps,
+            marched.status,
+            marched.resolved,
+            marched.pixel,
+            marched.prim_id,
+            marched.t,
+            marched.t_free,
+            marched.steps,
+            steps_by_level,
+        )
+    steps_by_level.sum(axis=0, out=marched.steps_by_level)
+    return marched
