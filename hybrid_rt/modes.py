@@ -100,8 +100,8 @@ class Linear(_Thick):
     ----------
     .. [1] T. Sousa, N. Kasyan and N. Schulz, "Secrets of CryENGINE 3 Graphics Technology",
        SIGGRAPH 2011, Advances in Real-Time Rendering in Games (real-time local reflections).
-    .. [2] T. Stachowiak, "Stochastic Screen-Space Reflections", SIGGRAPH 2015, Advances in
-       Real-Time Rendering in Games, which gives the linear march and what replaces it.
+    .. [2] T. Stachowiak and Y. Uludag, "Stochastic Screen-Space Reflections", SIGGRAPH 2015,
+       Advances in Real-Time Rendering in Games, which gives the linear march and what replaces it.
     """
 
     stride: float = 0.02
