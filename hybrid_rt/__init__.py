@@ -14,6 +14,7 @@ from hybrid_rt.march import march
 from hybrid_rt.metrics import Judged, Rate, Verdict, alpha, by_status, judge, rates
 from hybrid_rt.modes import (
     DEFAULT_THICKNESS,
+    Certified,
     HiZ,
     Linear,
     Mode,
@@ -36,6 +37,7 @@ from hybrid_rt.types import (
     Marched,
     MarchStatus,
     Mesh,
+    PrimitiveLists,
     Rays,
     Scene,
     SlopePyramid,
@@ -48,6 +50,7 @@ __all__ = [
     "ArgumentError",
     "BruteForceTracer",
     "Camera",
+    "Certified",
     "DepthPyramid",
     "EmbreeError",
     "EmbreeTracer",
@@ -65,6 +68,7 @@ __all__ = [
     "Mode",
     "Paper",
     "PixelDDA",
+    "PrimitiveLists",
     "Rate",
     "Rays",
     "Scene",

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from hybrid_rt import _check, dda, hiz, linear, modes, paper, slope
+from hybrid_rt import _check, certified, dda, hiz, linear, modes, paper, slope
 from hybrid_rt.errors import ArgumentError
-from hybrid_rt.modes import HiZ, Linear, Mode, PixelDDA, SlopeAware
+from hybrid_rt.modes import Certified, HiZ, Linear, Mode, PixelDDA, SlopeAware
 from hybrid_rt.types import DepthPyramid, GBuffer, Marched, Pyramid, Rays, SlopePyramid
 
 
@@ -14,6 +14,7 @@ def march(
     pyramid: Pyramid,
     mode: str | Mode = "paper",
     *,
+    any_hit: bool = False,
     threads: int | None = None,
 ) -> Marched:
     """Return what the screen says about each ray, and for which rays it says nothing.
@@ -26,10 +27,13 @@ def march(
     gbuffer : GBuffer
     pyramid : DepthPyramid or SlopePyramid
         Of `gbuffer`. A SlopePyramid is for mode "slope" only, which makes its own, within the call,
-        where it gets a DepthPyramid.
-    mode : {"paper", "linear", "dda", "hiz", "slope"} or a mode object
-        The technique, one of `Paper`, `Linear`, `PixelDDA`, `HiZ`, `SlopeAware`; see
+        where it gets a DepthPyramid; a conservative one for mode "certified" only.
+    mode : {"paper", "certified", "slope", "linear", "dda", "hiz"} or a mode object
+        The technique, one of `Paper`, `Certified`, `SlopeAware`, `Linear`, `PixelDDA`, `HiZ`; see
         `hybrid_rt.modes`. A name stands for its default parameters.
+    any_hit : bool
+        Whether any hit answers a ray and not only its nearest. In all modes but "certified" the
+        first hit is the answer, and this changes nothing.
     threads : int, optional
         Default: as many as Numba is set to.
 
@@ -60,6 +64,8 @@ def march(
     if isinstance(chosen, SlopeAware):
         return slope.march(rays, gbuffer, pyramid, chosen, threads)
     assert isinstance(pyramid, DepthPyramid)
+    if isinstance(chosen, Certified):
+        return certified.march(rays, gbuffer, pyramid, chosen, any_hit, threads)
     if isinstance(chosen, Linear):
         return linear.march(rays, gbuffer, pyramid, chosen, threads)
     if isinstance(chosen, PixelDDA):
@@ -80,3 +86,6 @@ def _check_pyramid(pyramid: Pyramid, gbuffer: GBuffer, mode: Mode) -> None:
             f"the pyramid of the G-buffer, {width} by {height} pixels at level 0",
             f"one of {pyramid.widths[0]} by {pyramid.heights[0]}",
         )
+    conservative = isinstance(pyramid, DepthPyramid) and pyramid.conservative
+    if conservative and not isinstance(mode, Certified):
+        raise ArgumentError("pyramid", "one of the depths at pixel centres", "a conservative one")

@@ -273,9 +273,54 @@ class Camera:
             ]
         )
 
+    @property
+    def world_from_pixel(self) -> F64:
+        """(3, 3) float64; rows right / f, -up / f and forward, with f = `focal_px`.
+
+        The ray ``forward + (x - W / 2) row0 + (y - H / 2) row1`` runs from the eye through the
+        place (x, y) of the screen and has z_view = 1 at its end.
+        """
+        f = self.focal_px
+        return np.stack([np.array(self.right) / f, -np.array(self.up) / f, np.array(self.forward)])
+
 
 def _vec(v: F64) -> tuple[float, float, float]:
     return float(v[0]), float(v[1]), float(v[2])
+
+
+@dataclass(frozen=True, eq=False)
+class PrimitiveLists:
+    """For each pixel, the primitives that touch its square, as far as the list goes.
+
+    A pixel's square is grown by `margin_px` to each side. Every triangle with a point in front of
+    the near plane that projects into the grown square is in the pixel's list, with a bound that
+    none of these points is nearer than, or `rest` is such a bound.
+
+    Attributes
+    ----------
+    prim_id : (H, W, K) int32
+        Index into ``scene.faces``, nearest bound first, -1 past the end.
+    nearest : (H, W, K) float32
+        Upper bound of the depth, descending; 0 past the end.
+    rest : (H, W) float32
+        Upper bound of the depth of everything that is not in the list; 0 if that is nothing.
+    margin_px : float
+    """
+
+    prim_id: I32
+    nearest: F32
+    rest: F32
+    margin_px: float
+
+    @property
+    def length(self) -> int:
+        """K, the largest number of primitives in a list."""
+        return int(self.prim_id.shape[2])
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays: 8 K + 4 a pixel."""
+        return int(self.prim_id.nbytes + self.nearest.nbytes + self.rest.nbytes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,6 +337,8 @@ class GBuffer:
         Index into ``scene.faces``, -1 where nothing is visible.
     scene : Scene
     camera : Camera
+    lists : PrimitiveLists, optional
+        What mode "certified" reads, if the rasteriser was asked for it.
     """
 
     depth: F32
@@ -300,6 +347,7 @@ class GBuffer:
     prim_id: I32
     scene: Scene
     camera: Camera
+    lists: PrimitiveLists | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,12 +364,16 @@ class DepthPyramid:
     offsets : (L,) int64
         Index of the first cell of each level in `data`.
     widths, heights : (L,) int64
+    conservative : bool
+        Whether the depths are those of pixel squares (the first bounds of `PrimitiveLists`) and
+        not those of pixel centres.
     """
 
     data: F32
     offsets: I64
     widths: I64
     heights: I64
+    conservative: bool = False
 
     def __len__(self) -> int:
         return len(self.offsets)
@@ -512,13 +564,15 @@ class MarchStatus(enum.IntEnum):
     OFFSCREEN = 2
     """It leaves the image sideways."""
     HIDDEN = 3
-    """It meets or goes behind a visible surface and no pixel's plane answers it."""
+    """It meets or goes behind a visible surface, and what the screen holds does not answer it."""
     NEAR = 4
     """It leaves through the near plane, towards the observer."""
     EXHAUSTED = 5
     """The step budget ran out."""
     INVALID = 6
     """NaN, an infinity or a zero direction."""
+    UNDECIDED = 7
+    """Certified only: two hits, or a hit and a miss, are closer than float64 can tell apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -544,6 +598,8 @@ class Marched:
         Samples of the pyramid that the ray took.
     steps_by_level : (L,) int64
         The same, summed over the rays, for each level.
+    tests : int
+        Exact tests of a ray against a primitive, over all rays; only mode "certified" makes any.
     """
 
     status: U8
@@ -554,6 +610,7 @@ class Marched:
     t_free: F32
     steps: I32
     steps_by_level: I64
+    tests: int = 0
 
     @classmethod
     def unfilled(cls, n: int, levels: int) -> Marched:
