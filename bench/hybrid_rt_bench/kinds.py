@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hybrid_rt_bench.run import Outcome, run_experiment
+from hybrid_rt_bench.stability import run_stability
 
 Runner = Callable[..., Outcome]
 
-RUNNERS: dict[str, Runner] = {"paper": run_experiment}
+RUNNERS: dict[str, Runner] = {"paper": run_experiment, "stability": run_stability}
 """What runs an experiment of each kind of `hybrid_rt_bench.spec.KINDS`.
 
 A runner takes the experiment and, by name, `reporter`, `threads`, `out`, `command` and those

@@ -77,10 +77,7 @@ def run_experiment(
     ReportsError
         The folder can no longer be written to.
     """
-    most = env.most_threads()
-    threads = most if threads is None else threads
-    if not 1 <= threads <= most:
-        raise hrt.ArgumentError("threads", f"1 to {most} (the cores of this machine)", str(threads))
+    threads = env.checked_threads(threads)
     techniques = [get_technique(name) for name in experiment.techniques]
     reporter.doing("reading scenes")
     plan = make_plan(experiment, scenes, cameras)
@@ -132,14 +129,14 @@ def _measure_all(
     a_cell = experiment.warmup + experiment.rounds
     cells = sum(len(scene.cameras) for scene in plan.scenes) * len(experiment.resolutions)
     reporter.total(cells * a_cell)
-    for path, reason in plan.unreadable:
-        _fail(writer, reporter, Path(path).stem, "", None, reason)
+    for path, why in plan.unreadable:
+        _fail(writer, reporter, Path(path).stem, "", None, why)
     for planned in plan.scenes:
         reporter.doing(f"loading {planned.spec.name}")
         try:
             loaded = _load(planned, threads, writer)
         except (hrt.HybridRTError, MemoryError) as error:
-            _fail(writer, reporter, planned.spec.name, "", None, _reason(error))
+            _fail(writer, reporter, planned.spec.name, "", None, reason(error))
             reporter.advance(len(planned.cameras) * len(experiment.resolutions) * a_cell)
             continue
         for camera in planned.cameras:
@@ -184,7 +181,7 @@ def _measure_one(
         raise
     except Exception as error:  # one bad cell must not cost the others
         reporter.advance(experiment.warmup + experiment.rounds - done)
-        _fail(writer, reporter, planned.spec.name, camera, resolution, _reason(error))
+        _fail(writer, reporter, planned.spec.name, camera, resolution, reason(error))
         return
     writer.add_cell(
         {**_keys(planned.spec.name, camera, resolution), **record.details},
@@ -258,7 +255,8 @@ def _warn_of_scatter(writer: RunWriter, reporter: Reporter) -> None:
         )
 
 
-def _reason(error: BaseException) -> str:
+def reason(error: BaseException) -> str:
+    """Return what to say of an error that costs a cell: where it was raised, if not on purpose."""
     if isinstance(error, hrt.HybridRTError):
         return str(error)
     if isinstance(error, MemoryError):

@@ -16,6 +16,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from hybrid_rt.errors import ArgumentError, UnknownNameError
 from hybrid_rt_bench.spec_base import AnyExperiment, Resolution, ResolutionText, SceneEntry
+from hybrid_rt_bench.spec_stability import StabilityExperiment
 
 __all__ = [
     "KINDS",
@@ -71,7 +72,10 @@ class Experiment(AnyExperiment):
         return ""
 
 
-KINDS: dict[str, type[AnyExperiment]] = {"paper": Experiment}
+KINDS: dict[str, type[AnyExperiment]] = {
+    "paper": Experiment,
+    "stability": StabilityExperiment,
+}
 """The class of each kind of experiment."""
 
 

@@ -70,6 +70,11 @@ class CaseResult:
     false_free: int
     first: dict[str, list[int]] = field(default_factory=dict)
 
+    @classmethod
+    def nothing(cls, case: str, rays: int, *, exact: bool) -> CaseResult:
+        """Return the result of a technique that gave no answers at all."""
+        return cls(case, exact, rays, rays, 0, 0, 0, 0, 0, 0, 0)
+
     @property
     def wrong(self) -> int:
         """Number of rays that fail the case."""
