@@ -1,7 +1,8 @@
 """What is true of a ray and a few triangles, found without any tracer.
 
 Rays and vertices are float32 and taken as exact. Every triangle is tried. Float64 decides where its
-error bound allows that, and rational arithmetic where it does not, so `Truth.prim_id` is exact.
+error bound allows that, and rational arithmetic where it does not; only which of two hits less than
+an ulp of float64 apart is the nearer stays open.
 
 A tracer in float32 cannot know more than the ray to within its rounding: `SLACK` times the largest
 coordinate of the triangle's corners *relative to the origin* (whoever subtracts the origin first
