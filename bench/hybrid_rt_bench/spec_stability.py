@@ -21,7 +21,8 @@ class StabilityExperiment(AnyExperiment):
     tracers : list of str
         Exact tracers that stand beside them, held to exact answers.
     promised : list of str
-        Techniques held to exact answers; a case that one of them fails makes the run a failure.
+        Those of the techniques that are held to exact answers; a case that one of them fails makes
+        the run a failure.
     cases : list of str, optional
         Names of hard cases. Default: all of them.
     """

@@ -29,7 +29,7 @@ def summary(run: RunData) -> Table:
     """Return one row a technique: cases passed, and the sums over all cases."""
     table = Table(
         "The hard set, summed over its cases",
-        ["", "cases passed", "rays", "resolved", "tie", "false hit", "false miss",
+        ["", "cases passed", "no answers", "rays", "resolved", "tie", "false hit", "false miss",
          "wrong primitive", "imprecise t"],
     )  # fmt: skip
     for technique, rows in run.results.groupby("technique", sort=False):
@@ -38,6 +38,7 @@ def summary(run: RunData) -> Table:
             [
                 f"{technique}, exact" if rows.exact.all() else str(technique),
                 f"{(rows.state == 'pass').sum()} of {len(rows)}",
+                str((rows.unresolved == rows.rays).sum()),
                 f"{rays:,}",
                 percent(resolved / rays),
                 *(f"{rows[kind].sum():,}" for kind in ("tie", *COUNTS[:4])),
@@ -45,7 +46,7 @@ def summary(run: RunData) -> Table:
         )
     table.notes += [
         "A case is passed if none of the rays that a technique answers is a false hit (more than a "
-        "pixel from the truth) or a false miss.",
+        "pixel from the truth) or a false miss. No answers: cases of which it answers no ray.",
         "Exact: held to the right primitive and to t as float32 can know it as well, and to proven "
         "hand-over distances.",
     ]
