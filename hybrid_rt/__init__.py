@@ -8,16 +8,24 @@ from hybrid_rt.errors import (
     MeshFileError,
     UnknownNameError,
 )
-from hybrid_rt.hybrid import trace_hybrid
+from hybrid_rt.hybrid import occluded_hybrid, trace_hybrid
 from hybrid_rt.io import read_mesh
+from hybrid_rt.lights import AreaLight, DirectionalLight, Light, PointLight
 from hybrid_rt.march import march
 from hybrid_rt.metrics import Judged, Rate, Verdict, alpha, by_status, judge, rates
-from hybrid_rt.modes import Mode, Paper
+from hybrid_rt.modes import Certified, Mode, Paper
 from hybrid_rt.pyramid import build_depth_pyramid
 from hybrid_rt.raster import rasterize
-from hybrid_rt.rays import mirror_rays
+from hybrid_rt.rays import (
+    ambient_occlusion_rays,
+    diffuse_rays,
+    glossy_rays,
+    mirror_rays,
+    shadow_rays,
+)
 from hybrid_rt.scene import load_scene
 from hybrid_rt.trace import BruteForceTracer, EmbreeTracer, embree_info, packet_available
+from hybrid_rt.truth import Nearest, Truth
 from hybrid_rt.types import (
     Camera,
     DepthPyramid,
@@ -27,6 +35,8 @@ from hybrid_rt.types import (
     Marched,
     MarchStatus,
     Mesh,
+    OcclusionResult,
+    PrimitiveLists,
     Rays,
     Scene,
 )
@@ -34,10 +44,13 @@ from hybrid_rt.types import (
 __version__ = "0.1.0"
 
 __all__ = [
+    "AreaLight",
     "ArgumentError",
     "BruteForceTracer",
     "Camera",
+    "Certified",
     "DepthPyramid",
+    "DirectionalLight",
     "EmbreeError",
     "EmbreeTracer",
     "GBuffer",
@@ -45,30 +58,41 @@ __all__ = [
     "HybridRTError",
     "HybridResult",
     "Judged",
+    "Light",
     "MarchStatus",
     "Marched",
     "Mesh",
     "MeshFileError",
     "Mode",
+    "Nearest",
+    "OcclusionResult",
     "Paper",
+    "PointLight",
+    "PrimitiveLists",
     "Rate",
     "Rays",
     "Scene",
+    "Truth",
     "UnknownNameError",
     "Verdict",
     "alpha",
+    "ambient_occlusion_rays",
     "build_depth_pyramid",
     "by_status",
+    "diffuse_rays",
     "embree_info",
+    "glossy_rays",
     "judge",
     "load_scene",
     "march",
     "mirror_rays",
+    "occluded_hybrid",
     "packet_available",
     "project",
     "rasterize",
     "rates",
     "read_mesh",
+    "shadow_rays",
     "trace_hybrid",
     "unproject",
 ]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from hybrid_rt import _check, modes, paper
+from hybrid_rt import _check, certified, modes, paper
 from hybrid_rt.errors import ArgumentError
-from hybrid_rt.modes import Mode
+from hybrid_rt.modes import Certified, Mode
 from hybrid_rt.types import DepthPyramid, GBuffer, Marched, Rays
 
 
@@ -14,6 +14,7 @@ def march(
     pyramid: DepthPyramid,
     mode: str | Mode = "paper",
     *,
+    any_hit: bool = False,
     threads: int | None = None,
 ) -> Marched:
     """Return what the screen says about each ray, and for which rays it says nothing.
@@ -26,8 +27,11 @@ def march(
     gbuffer : GBuffer
     pyramid : DepthPyramid
         Of `gbuffer`.
-    mode : {"paper"} or a mode object
+    mode : {"paper", "certified"} or a mode object
         The technique; see `hybrid_rt.modes`. A name stands for its default parameters.
+    any_hit : bool
+        Whether any hit answers a ray and not only its nearest. For "paper", whose first hit is its
+        answer, this changes nothing.
     threads : int, optional
         Default: as many as Numba is set to.
 
@@ -52,6 +56,7 @@ def march(
     _check.instance("rays", rays, Rays)
     _check.instance("gbuffer", gbuffer, GBuffer)
     _check.instance("pyramid", pyramid, DepthPyramid)
+    _check.choice("any_hit", any_hit, (True, False))
     chosen = modes.named(mode)
     height, width = gbuffer.depth.shape
     if (pyramid.heights[0], pyramid.widths[0]) != (height, width):
@@ -60,4 +65,8 @@ def march(
             f"the pyramid of the G-buffer, {width} by {height} pixels at level 0",
             f"one of {pyramid.widths[0]} by {pyramid.heights[0]}",
         )
+    if isinstance(chosen, Certified):
+        return certified.march(rays, gbuffer, pyramid, chosen, any_hit, threads)
+    if pyramid.conservative:
+        raise ArgumentError("pyramid", "one of the depths at pixel centres", "a conservative one")
     return paper.march(rays, gbuffer, pyramid, chosen, threads)

@@ -5,16 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid_rt import _check, _threads
+from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels import pyramid as kernels
 from hybrid_rt.types import DepthPyramid, GBuffer
 
 
-def build_depth_pyramid(gbuffer: GBuffer, *, threads: int | None = None) -> DepthPyramid:
+def build_depth_pyramid(
+    gbuffer: GBuffer, *, conservative: bool = False, threads: int | None = None
+) -> DepthPyramid:
     """Return the nearest depth of every 1, 4, 16 ... pixels, up to one cell for the whole image.
 
     Parameters
     ----------
     gbuffer : GBuffer
+    conservative : bool
+        Of the nearest depth anywhere in a pixel's square, from the G-buffer's lists, which mode
+        "certified" needs, instead of the depth at its centre.
     threads : int, optional
         Default: as many as Numba is set to.
 
@@ -27,7 +33,8 @@ def build_depth_pyramid(gbuffer: GBuffer, *, threads: int | None = None) -> Dept
     Raises
     ------
     ArgumentError
-        `gbuffer` is not a GBuffer, `threads` is out of range.
+        `gbuffer` is not a GBuffer, or has no lists for a conservative pyramid; `threads` is out of
+        range.
 
     Notes
     -----
@@ -40,7 +47,14 @@ def build_depth_pyramid(gbuffer: GBuffer, *, threads: int | None = None) -> Dept
     stops at floor(log2(min(W, H))) levels above the first; here all of them are built.
     """
     _check.instance("gbuffer", gbuffer, GBuffer)
-    height, width = gbuffer.depth.shape
+    depth = gbuffer.depth
+    if conservative:
+        if gbuffer.lists is None:
+            raise ArgumentError(
+                "gbuffer", "one with lists, from rasterize(..., lists=8)", "one without"
+            )
+        depth = np.ascontiguousarray(gbuffer.lists.nearest[:, :, 0])
+    height, width = depth.shape
     sizes = [(width, height)]
     while sizes[-1] != (1, 1):
         w, h = sizes[-1]
@@ -50,5 +64,5 @@ def build_depth_pyramid(gbuffer: GBuffer, *, threads: int | None = None) -> Dept
     offsets = np.cumsum(cells) - cells
     data = np.empty(int(cells.sum()), np.float32)
     with _threads.limited(threads):
-        kernels.build(gbuffer.depth, offsets, widths, heights, data)
-    return DepthPyramid(data, offsets, widths, heights)
+        kernels.build(depth, offsets, widths, heights, data)
+    return DepthPyramid(data, offsets, widths, heights, conservative)

@@ -14,6 +14,7 @@ import enum
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -143,7 +144,7 @@ class Scene:
         zero_area = int((np.cross(b - a, c - a) == 0).all(axis=1).sum())
         return cls(v, f, np.concatenate(ids), name, zero_area)
 
-    @property
+    @cached_property
     def bounds(self) -> F64:
         """(2, 3) float64, world: the smallest and the largest corner of the used vertices."""
         used = self.vertices[self.faces.ravel()].astype(np.float64)
@@ -266,9 +267,54 @@ class Camera:
             ]
         )
 
+    @property
+    def world_from_pixel(self) -> F64:
+        """(3, 3) float64; rows right / f, -up / f and forward, with f = `focal_px`.
+
+        The ray ``forward + (x - W / 2) row0 + (y - H / 2) row1`` runs from the eye through the
+        place (x, y) of the screen and has z_view = 1 at its end.
+        """
+        f = self.focal_px
+        return np.stack([np.array(self.right) / f, -np.array(self.up) / f, np.array(self.forward)])
+
 
 def _vec(v: F64) -> tuple[float, float, float]:
     return float(v[0]), float(v[1]), float(v[2])
+
+
+@dataclass(frozen=True, eq=False)
+class PrimitiveLists:
+    """For each pixel, the primitives that touch its square, as far as the list goes.
+
+    A pixel's square is grown by `margin_px` to each side. Every triangle with a point in front of
+    the near plane that projects into the grown square is in the pixel's list, with a bound that
+    none of these points is nearer than, or `rest` is such a bound.
+
+    Attributes
+    ----------
+    prim_id : (H, W, K) int32
+        Index into ``scene.faces``, nearest bound first, -1 past the end.
+    nearest : (H, W, K) float32
+        Upper bound of the depth, descending; 0 past the end.
+    rest : (H, W) float32
+        Upper bound of the depth of everything that is not in the list; 0 if that is nothing.
+    margin_px : float
+    """
+
+    prim_id: I32
+    nearest: F32
+    rest: F32
+    margin_px: float
+
+    @property
+    def length(self) -> int:
+        """K, the largest number of primitives in a list."""
+        return int(self.prim_id.shape[2])
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays: 8 K + 4 a pixel."""
+        return int(self.prim_id.nbytes + self.nearest.nbytes + self.rest.nbytes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,6 +331,8 @@ class GBuffer:
         Index into ``scene.faces``, -1 where nothing is visible.
     scene : Scene
     camera : Camera
+    lists : PrimitiveLists, optional
+        What mode "certified" reads, if the rasteriser was asked for it.
     """
 
     depth: F32
@@ -293,6 +341,7 @@ class GBuffer:
     prim_id: I32
     scene: Scene
     camera: Camera
+    lists: PrimitiveLists | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,12 +358,16 @@ class DepthPyramid:
     offsets : (L,) int64
         Index of the first cell of each level in `data`.
     widths, heights : (L,) int64
+    conservative : bool
+        Whether the depths are those of pixel squares (the first bounds of `PrimitiveLists`) and
+        not those of pixel centres.
     """
 
     data: F32
     offsets: I64
     widths: I64
     heights: I64
+    conservative: bool = False
 
     def __len__(self) -> int:
         return len(self.offsets)
@@ -468,13 +521,15 @@ class MarchStatus(enum.IntEnum):
     OFFSCREEN = 2
     """It leaves the image sideways."""
     HIDDEN = 3
-    """It meets or goes behind a visible surface and no pixel's plane answers it."""
+    """It meets or goes behind a visible surface, and what the screen holds does not answer it."""
     NEAR = 4
     """It leaves through the near plane, towards the observer."""
     EXHAUSTED = 5
     """The step budget ran out."""
     INVALID = 6
     """NaN, an infinity or a zero direction."""
+    UNDECIDED = 7
+    """Certified only: two hits, or a hit and a miss, are closer than float64 can tell apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -500,6 +555,8 @@ class Marched:
         Samples of the pyramid that the ray took.
     steps_by_level : (L,) int64
         The same, summed over the rays, for each level.
+    tests : int
+        Exact tests of a ray against a primitive, over all rays; only mode "certified" makes any.
     """
 
     status: U8
@@ -510,6 +567,7 @@ class Marched:
     t_free: F32
     steps: I32
     steps_by_level: I64
+    tests: int = 0
 
     @classmethod
     def unfilled(cls, n: int, levels: int) -> Marched:
@@ -529,8 +587,29 @@ class Marched:
         return len(self.status)
 
 
+class _OfMarch:
+    """What the results of a hybrid say of its march."""
+
+    marched: Marched
+
+    @property
+    def resolved(self) -> Bool:
+        """(N,) bool: whether the march answered the ray."""
+        return self.marched.resolved
+
+    @property
+    def status(self) -> U8:
+        """(N,) uint8: `MarchStatus` of every ray."""
+        return self.marched.status
+
+    @property
+    def pixel(self) -> I32:
+        """(N, 2) int32: the pixel that answered the ray, (-1, -1) where none did."""
+        return self.marched.pixel
+
+
 @dataclass(frozen=True, eq=False)
-class HybridResult:
+class HybridResult(_OfMarch):
     """What `trace_hybrid` returns.
 
     Attributes
@@ -547,17 +626,21 @@ class HybridResult:
     marched: Marched
     timings: dict[str, float] = field(default_factory=dict)
 
-    @property
-    def resolved(self) -> Bool:
-        """(N,) bool: whether the march answered the ray."""
-        return self.marched.resolved
 
-    @property
-    def status(self) -> U8:
-        """(N,) uint8: `MarchStatus` of every ray."""
-        return self.marched.status
+@dataclass(frozen=True, eq=False)
+class OcclusionResult(_OfMarch):
+    """What `occluded_hybrid` returns.
 
-    @property
-    def pixel(self) -> I32:
-        """(N, 2) int32: the pixel that answered the ray, (-1, -1) where none did."""
-        return self.marched.pixel
+    Attributes
+    ----------
+    occluded : (N,) bool
+        For every ray, from the march or from the tracer.
+    marched : Marched
+        What the march said of every ray.
+    timings : dict of str to float
+        Seconds of the stages "march", "compaction", "fallback", "merge".
+    """
+
+    occluded: Bool
+    marched: Marched
+    timings: dict[str, float] = field(default_factory=dict)

@@ -191,9 +191,10 @@ def compare(
 
 @app.command("list")
 def list_() -> None:
-    """List scenes with their cameras, experiments and techniques."""
+    """List scenes with their cameras, experiments, techniques and workloads."""
     import hybrid_rt_scenes as hrs
     from hybrid_rt_bench.techniques import TECHNIQUES
+    from hybrid_rt_bench.workloads import WORKLOADS
 
     table = RichTable("scene", "cameras", "what it is", title="Scenes", title_justify="left")
     missing = []
@@ -216,6 +217,10 @@ def list_() -> None:
     table = RichTable("technique", "what it does", title="Techniques", title_justify="left")
     for technique in TECHNIQUES.values():
         table.add_row(technique.name, technique.description)
+    out.print(table)
+    table = RichTable("workload", "which rays", title="Workloads", title_justify="left")
+    for workload in WORKLOADS.values():
+        table.add_row(workload.name, workload.description)
     out.print(table)
 
 

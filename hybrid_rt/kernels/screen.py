@@ -16,7 +16,7 @@ import numpy as np
 
 from hybrid_rt.kernels._jit import inlined
 
-HIT, MISS, OFFSCREEN, HIDDEN, NEAR, EXHAUSTED, INVALID = range(7)  # types.MarchStatus
+HIT, MISS, OFFSCREEN, HIDDEN, NEAR, EXHAUSTED, INVALID, UNDECIDED = range(8)  # types.MarchStatus
 
 CHUNK = 1024  # rays that a thread takes at a time
 
