@@ -2,32 +2,33 @@
 
 A *resolved* ray is one that the judged technique answers, with a hit (a primitive) or with a miss.
 Its answer is the *claim*; the *reference* is the answer of a robust tracer. Where both name the
-same primitive, or both a miss, the claim is CORRECT. Everything else is decided by a float64 judge,
-which takes the ray and the triangles, all float32, as exact, and intersects the ray with the two
-primitives named. Each is
+same primitive, or both a miss, the claim is CORRECT, and no more is asked, unless `judge` is told
+to look at every ray. Everything else is held against the truth over all triangles of the scene,
+found by `hybrid_rt.truth`, which says what it is to *hit*, to *graze* or to *miss* a triangle.
 
-- *hit*: the ray passes through the closed triangle with t_near <= t <= t_far;
-- *grazed*: not hit, but the ray passes its edge within ``8 * 2**-24`` times the largest coordinate
-  of the origin and the triangle, or t exceeds a limit by as little. A tracer in float32 cannot
-  tell a grazed triangle from a hit one;
-- *missed* otherwise. A triangle without area is always missed.
+An answer is *right*, the claim and the reference each on its own, if
+
+- it is a miss, and no triangle is hit; or
+- its primitive is hit or grazed at a t that exceeds that of the nearest hit, if there is one, by no
+  more than ``8 * 2**-24 * (t + largest coordinate / |direction|)``. So an answer is right that
+  ties with the truth at a shared edge or vertex, on a coplanar duplicate or where triangles pass
+  through each other; and a triangle that is only grazed may be there or not.
 
 Verdicts, the first that fits:
 
 ======================  ===========================================================================
 UNRESOLVED              The technique gives no answer.
-CORRECT                 The same primitive, or both a miss.
-TIE                     Both primitives are touched (hit or grazed) and their t differ by no more
-                        than ``8 * 2**-24 * (t + largest coordinate / |direction|)``: shared edges
-                        and vertices, coplanar duplicates. Or the nearer of the two is only grazed
-                        and the other answer is right if it is not there.
-REFERENCE_WRONG         The claimed primitive is hit, nearer than the reference's if that is
-                        touched at all; or the claim is a miss and the reference's primitive missed.
-FALSE_MISS              The claim is a miss, and the reference's primitive is hit.
+CORRECT                 The same primitive, or both a miss; if looked at, right.
+TIE                     Both answers are right, and differ.
+REFERENCE_WRONG         The claim is right, the reference is not.
+FALSE_MISS              The claim is a miss, and something is hit.
 WRONG_PRIMITIVE         Another primitive than the true one, but within `pixel_tolerance` pixels of
                         the true hit.
 FALSE_HIT               A hit is claimed where the truth is a miss or farther off than that.
 ======================  ===========================================================================
+
+That the reference is wrong is told apart from the verdict as well, in `Judged.reference_wrong`:
+where claim and reference are both wrong, the verdict is on the claim.
 
 The technique of the paper answers with a pixel. On a mesh of pixel-sized triangles such an answer
 is often right to the pixel and wrong in the triangle, so WRONG_PRIMITIVE is kept apart. The
@@ -35,9 +36,6 @@ opposite, the right primitive at a distant pixel, is CORRECT: the pixel stands f
 primitive, the t that follows from that plane is exact, and on a large triangle that is what the
 tilted plane is for. Whoever wants distant pixels counted whatever their primitive has "pixel_error"
 in `rates`: claimed hits that lie more than `pixel_tolerance` pixels from the truth.
-
-The truth is never sought beyond the two primitives named: where the reference overlooks a third
-that is nearer than both, so does the judge.
 """
 
 from __future__ import annotations
@@ -47,15 +45,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from hybrid_rt import _check
 from hybrid_rt.camera import project
 from hybrid_rt.errors import ArgumentError
-from hybrid_rt.kernels import metrics as kernels
+from hybrid_rt.rate import Rate
+from hybrid_rt.truth import MISSED, Truth
 from hybrid_rt.types import F32, F64, I32, U8, Bool, Camera, Hits, MarchStatus, Rays, Scene
-
-TIE_ULPS = 8 * 2.0**-24
 
 
 class Verdict(enum.IntEnum):
@@ -79,14 +75,17 @@ class Judged:
     verdict : (N,) uint8
         A `Verdict` for each ray.
     error_t : (N,) float64
-        ``abs(t - t_true) / t_true`` of a claimed hit; NaN where nothing is claimed to be hit or
-        nothing is.
+        ``abs(t - t_true) / t_true`` of a claimed hit, with t_true in float64: of the claimed
+        primitive where the claim is right, of the nearest otherwise. NaN where nothing is claimed
+        to be hit or nothing is.
     error_px : (N,) float64
         The larger of the distances in x and y, in pixels, between the true hit's place on screen
         and the centre of the claimed pixel, or the place of the claimed hit for an answer without a
         pixel. Infinite where nothing is truly hit, or where only one of the two is in front of the
         camera; NaN where no hit is claimed, or an answer without a pixel is, like the truth,
         behind the camera.
+    reference_wrong : (N,) bool
+        Whether the reference was looked at and is wrong, whatever the claim.
     pixel_tolerance : float
         The `pixel_tolerance` of the judge.
     """
@@ -94,6 +93,7 @@ class Judged:
     verdict: U8
     error_t: F64
     error_px: F64
+    reference_wrong: Bool
     pixel_tolerance: float
 
     def __len__(self) -> int:
@@ -109,6 +109,9 @@ def judge(
     camera: Camera,
     pixel: Any = None,
     pixel_tolerance: float = 1.0,
+    *,
+    truth: Truth | None = None,
+    every: bool = False,
 ) -> Judged:
     """Return what is right and what is wrong in the answers to rays.
 
@@ -130,6 +133,11 @@ def judge(
         The pixel that stands for each answer, (-1, -1) for answers without one. Default: none has.
     pixel_tolerance : float
         Pixels, > 0.
+    truth : Truth, optional
+        Of `scene`, to be built once and used for many judgements. Default: a new one, whose tree is
+        built only if an answer has to be looked at.
+    every : bool
+        Look at every resolved ray, also where claim and reference agree.
 
     Returns
     -------
@@ -138,7 +146,8 @@ def judge(
     Raises
     ------
     ArgumentError
-        Arrays of different lengths, or a prim_id that the scene does not have.
+        Arrays of different lengths, a prim_id that the scene does not have, or a truth of another
+        scene.
     """
     for name, value, cls in (
         ("rays", rays, Rays),
@@ -164,58 +173,29 @@ def judge(
         _check.same_length("pixel", px, "rays", n)
     tolerance = _check.real("pixel_tolerance", pixel_tolerance, above=0.0)
 
+    _check.choice("every", every, (True, False))
+    truth = _truth_of(scene, truth)
+
     judged = Judged(
-        np.full(n, Verdict.UNRESOLVED, np.uint8), np.full(n, np.nan), np.full(n, np.nan), tolerance
-    )
-    at = np.flatnonzero(answered)
-    verdict, error_t, error_px = _judge_resolved(
-        rays.take(at),
-        claimed.prim_id[at],
-        claimed.t[at],
-        reference.prim_id[at],
-        reference.t[at],
-        scene,
-        camera,
-        px[at],
+        np.full(n, Verdict.UNRESOLVED, np.uint8),
+        np.full(n, np.nan),
+        np.full(n, np.nan),
+        np.zeros(n, np.bool_),
         tolerance,
     )
-    judged.verdict[at], judged.error_t[at], judged.error_px[at] = verdict, error_t, error_px
-    return judged
-
-
-def _judge_resolved(
-    rays: Rays,
-    claim: I32,
-    claim_t: F32,
-    ref: I32,
-    ref_t: F32,
-    scene: Scene,
-    camera: Camera,
-    pixel: I32,
-    pixel_tolerance: float,
-) -> tuple[U8, F64, F64]:
-    """Judge rays that are all resolved; the definitions are those of the module's docstring."""
-    same = claim == ref
-    r_state, r_t, r_tolerance = _touch(rays, ref, scene)
-    c_state, c_t, c_tolerance = _touch(rays, np.where(same, -1, claim).astype(np.int32), scene)
-    r_touched, c_touched = r_state != kernels.MISSED, c_state != kernels.MISSED
-
-    tie = r_touched & c_touched & (np.abs(r_t - c_t) <= np.maximum(r_tolerance, c_tolerance))
-    c_first = c_touched & (~r_touched | (c_t < r_t))
-    r_first = r_touched & ~c_first
-    # A nearer primitive that is only grazed may be there or not: the other answer is right too, if
-    # it is what lies behind. For a claimed miss that is nothing.
-    tie |= c_first & (c_state == kernels.GRAZED)
-    tie |= r_first & (r_state == kernels.GRAZED) & (c_touched | (claim < 0))
-    reference_wrong = (c_first & (c_state == kernels.HIT)) | ((claim < 0) & ~r_touched)
-
-    t_true = np.where(r_touched, r_t, ref_t.astype(np.float64))
-    t_true = np.where(~same & c_first, c_t, t_true)
-    t_true = np.where(~same & reference_wrong & (claim < 0), np.inf, t_true)
-    error_t, error_px = _errors(rays, claim, claim_t, t_true, camera, pixel)
-
-    verdict = np.select(
-        [same, tie, reference_wrong, claim < 0, error_px <= pixel_tolerance],
+    at = np.flatnonzero(answered)
+    rays, claim, ref = rays.take(at), claimed.prim_id[at], reference.prim_id[at]
+    look = np.asarray((claim != ref) | every)
+    claim_right, reference_right, t_true = _hold(rays, claim, ref, reference.t[at], look, truth)
+    error_t, error_px = _errors(rays, claim, claimed.t[at], t_true, camera, px[at])
+    judged.verdict[at] = np.select(
+        [
+            claim_right & reference_right & (claim == ref),
+            claim_right & reference_right,
+            claim_right,
+            claim < 0,
+            error_px <= tolerance,
+        ],
         [
             Verdict.CORRECT,
             Verdict.TIE,
@@ -225,18 +205,118 @@ def _judge_resolved(
         ],
         Verdict.FALSE_HIT,
     )
-    return verdict.astype(np.uint8), error_t, error_px
+    judged.error_t[at], judged.error_px[at] = error_t, error_px
+    judged.reference_wrong[at] = ~reference_right
+    return judged
 
 
-def _touch(rays: Rays, prim_id: I32, scene: Scene) -> tuple[U8, F64, F64]:
-    """Return how each ray meets the primitive named for it: state, t and the tolerance of t."""
+def judge_occlusion(
+    rays: Rays,
+    claimed: Any,
+    resolved: Any,
+    reference: Any,
+    scene: Scene,
+    *,
+    truth: Truth | None = None,
+) -> Judged:
+    """Return what is right and what is wrong in the answers to any-hit queries.
+
+    Parameters
+    ----------
+    rays : Rays
+        N rays; a hit with ``t_near <= t <= t_far`` occludes.
+    claimed : (N,) array_like of bool
+        Which rays are said to be occluded; those of unresolved rays are not looked at.
+    resolved : (N,) array_like of bool
+        The rays that the technique answers.
+    reference : (N,) array_like of bool
+        The answers of a robust tracer.
+    scene : Scene
+        What was traced.
+    truth : Truth, optional
+        As in `judge`.
+
+    Returns
+    -------
+    Judged
+        The verdicts UNRESOLVED, CORRECT, TIE, FALSE_HIT (occluded is claimed, and nothing is hit or
+        grazed), FALSE_MISS (free is claimed, and something is hit) and REFERENCE_WRONG. A ray that
+        grazes and hits nothing may be called either. No primitive and no place is claimed, so both
+        errors are NaN.
+
+    Raises
+    ------
+    ArgumentError
+        Arrays of different lengths, or a truth of another scene.
+    """
+    _check.instance("rays", rays, Rays)
+    _check.instance("scene", scene, Scene)
     n = len(rays)
-    state, t, tolerance = np.empty(n, np.uint8), np.empty(n), np.empty(n)
-    kernels.touch(
-        rays.origin, rays.direction, rays.t_near, rays.t_far, prim_id,
-        scene.vertices, scene.faces, TIE_ULPS, state, t, tolerance,
-    )  # fmt: skip
-    return state, t, tolerance
+    flags = []
+    for name, value in (("claimed", claimed), ("resolved", resolved), ("reference", reference)):
+        flag = _check.array(name, value, ("N",), np.bool_)
+        _check.same_length(name, flag, "rays", n)
+        flags.append(flag)
+    claim, answered, ref = flags
+    truth = _truth_of(scene, truth)
+    verdict = np.where(answered, Verdict.CORRECT, Verdict.UNRESOLVED).astype(np.uint8)
+    reference_wrong = np.zeros(n, np.bool_)
+    at = np.flatnonzero(answered & (claim != ref))
+    nearest = truth.nearest(rays.take(at))
+    hit = nearest.prim_id >= 0
+    either = ~hit & np.isfinite(nearest.t_grazed)
+    claim_right, reference_right = either | (claim[at] == hit), either | (ref[at] == hit)
+    verdict[at] = np.select(
+        [claim_right & reference_right, claim_right, claim[at]],
+        [Verdict.TIE, Verdict.REFERENCE_WRONG, Verdict.FALSE_HIT],
+        Verdict.FALSE_MISS,
+    )
+    reference_wrong[at] = ~reference_right
+    nothing = np.full(n, np.nan)
+    return Judged(verdict, nothing, nothing.copy(), reference_wrong, 1.0)
+
+
+def _truth_of(scene: Scene, truth: Truth | None) -> Truth:
+    """Return a truth of `scene`: the one given, if it is."""
+    if truth is None:
+        return Truth(scene)
+    _check.instance("truth", truth, Truth)
+    if truth.scene is not scene:
+        raise ArgumentError("truth", "a Truth of `scene`", f"one of scene {truth.scene.name!r}")
+    return truth
+
+
+def _hold(
+    rays: Rays, claim: I32, ref: I32, ref_t: F32, look: Bool, truth: Truth
+) -> tuple[Bool, Bool, F64]:
+    """Hold claim and reference against the truth where `look` says so, and trust them elsewhere.
+
+    Return which claims and which references are right, and the true t.
+    """
+    claim_right, reference_right = np.ones(len(rays), np.bool_), np.ones(len(rays), np.bool_)
+    state, t_claim = truth.touch(rays, claim)
+    t_true = np.where(state == MISSED, ref_t, t_claim)
+    at = np.flatnonzero(look)
+    if len(at) == 0:
+        return claim_right, reference_right, t_true
+    rays, claim, ref, t_claim = rays.take(at), claim[at], ref[at], t_claim[at]
+    other = claim != ref
+    t_ref = t_claim.copy()
+    t_ref[other] = truth.touch(rays.take(other), ref[other])[1]
+    nearest = truth.nearest(rays)
+    slack = truth.tolerance(rays, nearest.prim_id, nearest.t)
+    nothing = nearest.prim_id < 0
+    # The t of what is missed is NaN, and no NaN is small enough to be right.
+    for answer, t, right in ((claim, t_claim, claim_right), (ref, t_ref, reference_right)):
+        tie = np.maximum(slack, truth.tolerance(rays, answer, t))
+        right[at] = np.where(answer < 0, nothing, t <= nearest.t + tie)
+    # A claim that is right is met at its own t. A reference that is right by a graze alone is all
+    # the truth that there is to measure a wrong claim against.
+    t_reference = np.where(reference_right[at] & (ref >= 0), t_ref, np.inf)
+    t_true[at] = np.where(
+        claim_right[at] & (claim >= 0), t_claim, np.minimum(nearest.t, t_reference)
+    )
+    return claim_right, reference_right, t_true
 
 
 def _errors(
@@ -268,43 +348,6 @@ def _screen(rays: Rays, t: F64, camera: Camera) -> tuple[F64, Bool]:
     return xy_depth[:, :2], (xy_depth[:, 2] > 0) & np.isfinite(xy_depth).all(axis=1)
 
 
-@dataclass(frozen=True)
-class Rate:
-    """A share, with an interval for what it estimates.
-
-    Attributes
-    ----------
-    count, total : int
-    low, high : float
-        Exact 95 % interval (Clopper and Pearson 1934). For a count of zero `high` is the rule of
-        three, ``3 / total``: what has never been seen in that many rays is, at 95 %, no more
-        frequent. For no rays at all it is 0 to 1.
-    """
-
-    count: int
-    total: int
-    low: float
-    high: float
-
-    @classmethod
-    def of(cls, count: int, total: int) -> Rate:
-        """Return the rate of `count` in `total`."""
-        total = _check.integer("total", total, least=0)
-        count = _check.integer("count", count, least=0, most=total)
-        if total == 0:
-            return cls(0, 0, 0.0, 1.0)
-        if count == 0:
-            return cls(0, total, 0.0, min(1.0, 3.0 / total))
-        low = float(stats.beta.ppf(0.025, count, total - count + 1))
-        high = float(stats.beta.ppf(0.975, count + 1, total - count)) if count < total else 1.0
-        return cls(count, total, low, high)
-
-    @property
-    def value(self) -> float:
-        """``count / total``; NaN for no rays."""
-        return self.count / self.total if self.total else float("nan")
-
-
 def alpha(resolved: Any) -> Rate:
     """Return the share of resolved rays.
 
@@ -322,9 +365,10 @@ def rates(judged: Judged) -> dict[str, Rate]:
     Returns
     -------
     dict of str to Rate
-        "alpha" of all rays. Of the resolved rays: one for each verdict ("correct", "tie",
-        "false_hit", "false_miss", "wrong_primitive", "reference_wrong"), and "pixel_error" (a hit
-        is claimed, more than `pixel_tolerance` pixels from the truth, whatever its verdict).
+        "alpha" of all rays. Of the resolved rays: one for each verdict on the claim ("correct",
+        "tie", "false_hit", "false_miss", "wrong_primitive"); "reference_wrong" (the reference was
+        looked at and is wrong, whatever the claim); and "pixel_error" (a hit is claimed, more than
+        `pixel_tolerance` pixels from the truth, whatever its verdict).
 
     Notes
     -----
@@ -339,6 +383,7 @@ def rates(judged: Judged) -> dict[str, Rate]:
     for verdict in Verdict:
         if verdict is not Verdict.UNRESOLVED:
             result[verdict.name.lower()] = Rate.of(int(counts[verdict]), total)
+    result["reference_wrong"] = Rate.of(int(judged.reference_wrong.sum()), total)
     result["pixel_error"] = Rate.of(int((judged.error_px > judged.pixel_tolerance).sum()), total)
     return result
 

@@ -144,7 +144,7 @@ class Scene:
         zero_area = int((np.cross(b - a, c - a) == 0).all(axis=1).sum())
         return cls(v, f, np.concatenate(ids), name, zero_area)
 
-    @property
+    @cached_property
     def bounds(self) -> F64:
         """(2, 3) float64, world: the smallest and the largest corner of the used vertices."""
         used = self.vertices[self.faces.ravel()].astype(np.float64)
@@ -630,8 +630,29 @@ class Marched:
         return len(self.status)
 
 
+class _OfMarch:
+    """What the results of a hybrid say of its march."""
+
+    marched: Marched
+
+    @property
+    def resolved(self) -> Bool:
+        """(N,) bool: whether the march answered the ray."""
+        return self.marched.resolved
+
+    @property
+    def status(self) -> U8:
+        """(N,) uint8: `MarchStatus` of every ray."""
+        return self.marched.status
+
+    @property
+    def pixel(self) -> I32:
+        """(N, 2) int32: the pixel that answered the ray, (-1, -1) where none did."""
+        return self.marched.pixel
+
+
 @dataclass(frozen=True, eq=False)
-class HybridResult:
+class HybridResult(_OfMarch):
     """What `trace_hybrid` returns.
 
     Attributes
@@ -648,17 +669,21 @@ class HybridResult:
     marched: Marched
     timings: dict[str, float] = field(default_factory=dict)
 
-    @property
-    def resolved(self) -> Bool:
-        """(N,) bool: whether the march answered the ray."""
-        return self.marched.resolved
 
-    @property
-    def status(self) -> U8:
-        """(N,) uint8: `MarchStatus` of every ray."""
-        return self.marched.status
+@dataclass(frozen=True, eq=False)
+class OcclusionResult(_OfMarch):
+    """What `occluded_hybrid` returns.
 
-    @property
-    def pixel(self) -> I32:
-        """(N, 2) int32: the pixel that answered the ray, (-1, -1) where none did."""
-        return self.marched.pixel
+    Attributes
+    ----------
+    occluded : (N,) bool
+        For every ray, from the march or from the tracer.
+    marched : Marched
+        What the march said of every ray.
+    timings : dict of str to float
+        Seconds of the stages "march", "compaction", "fallback", "merge".
+    """
+
+    occluded: Bool
+    marched: Marched
+    timings: dict[str, float] = field(default_factory=dict)

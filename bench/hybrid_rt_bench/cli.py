@@ -87,15 +87,18 @@ def run(
 ) -> None:
     """Measure an experiment and write its tables and figures.
 
-    Every cell (scene x camera x resolution) is measured in interleaved rounds and kept as soon as
-    it is finished: Ctrl-C, or a cell that fails, costs only itself. The run's folder is
-    `reports/<date>-<time>-<experiment>`; `hybrid-rt report` renders it again at any time.
+    Every cell (scene x camera x resolution, and what else the experiment says) is measured in
+    interleaved rounds and kept as soon as it is finished: Ctrl-C, or a cell that fails, costs only
+    itself. The run's folder is `reports/<date>-<time>-<experiment>`; `hybrid-rt report` renders it
+    again at any time.
 
     Examples
     --------
     * `hybrid-rt run paper --quick` - a few minutes, nothing to download
 
     * `hybrid-rt run paper` - the whole experiment, on real scenes where they are found
+
+    * `hybrid-rt run error --quick` - speed against error of every technique
 
     * `hybrid-rt run paper --scenes sponza --cameras nave --resolutions 1920x1080 --rounds 15`
 
@@ -187,9 +190,10 @@ def compare(
 
 @app.command("list")
 def list_() -> None:
-    """List scenes with their cameras, experiments and techniques."""
+    """List scenes with their cameras, experiments, techniques and workloads."""
     import hybrid_rt_scenes as hrs
     from hybrid_rt_bench.techniques import TECHNIQUES
+    from hybrid_rt_bench.workloads import WORKLOADS
 
     table = RichTable("scene", "cameras", "what it is", title="Scenes", title_justify="left")
     missing = []
@@ -217,6 +221,10 @@ def list_() -> None:
         table.add_row(
             technique.name, what, ", ".join(f"{k} {v}" for k, v in technique.parameters.items())
         )
+    out.print(table)
+    table = RichTable("workload", "which rays", title="Workloads", title_justify="left")
+    for workload in WORKLOADS.values():
+        table.add_row(workload.name, workload.description)
     out.print(table)
     out.print("Thickness is a share of the diagonal of the scene's bounding box.")
 

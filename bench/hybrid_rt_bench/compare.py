@@ -43,11 +43,11 @@ def compare(a: RunData, b: RunData) -> Comparison:
     Raises
     ------
     ArgumentError
-        No cell in common, or a run in which nothing is timed.
+        No cell in common, or a run of another kind than "paper".
     """
     for run in (a, b):
-        if run.samples.empty:
-            raise ArgumentError("runs", "runs with timings", f"{run.name}, of kind {run.kind!r}")
+        if run.kind != "paper":
+            raise ArgumentError("runs", "two of kind 'paper'", f"{run.name}, of kind {run.kind!r}")
     both = a.results.merge(b.results, on=KEYS, suffixes=("_a", "_b"))
     if both.empty:
         raise ArgumentError("runs", f"a cell that {a.name} and {b.name} share", "none in common")

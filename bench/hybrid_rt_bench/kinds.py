@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from hybrid_rt_bench.error_run import run_error
 from hybrid_rt_bench.run import Outcome, run_experiment
 
 Runner = Callable[..., Outcome]
 
-RUNNERS: dict[str, Runner] = {"paper": run_experiment}
+RUNNERS: dict[str, Runner] = {"paper": run_experiment, "error": run_error}
 """What runs an experiment of each kind of `hybrid_rt_bench.spec.KINDS`.
 
 A runner takes the experiment and, by name, `reporter`, `threads`, `out`, `command` and those

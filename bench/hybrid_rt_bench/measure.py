@@ -42,6 +42,8 @@ class LoadedScene:
         What competes for the strongest Embree.
     reference : EmbreeTracer
         In robust mode, for the judge and for pictures.
+    truth : Truth
+        For the judge.
     build_seconds : dict of float
         By mode.
     """
@@ -49,6 +51,7 @@ class LoadedScene:
     scene: hrt.Scene
     candidates: list[strongest.Candidate]
     reference: hrt.EmbreeTracer
+    truth: hrt.Truth
     build_seconds: dict[str, float]
 
 
@@ -70,7 +73,8 @@ def prepare(scene: hrt.Scene, threads: int) -> LoadedScene:
         hrt.EmbreeTracer(scene, threads=threads, path=path, robust=mode) for mode in (True, False)
     )
     seconds = {"robust": robust.build_seconds, "default": default.build_seconds}
-    return LoadedScene(scene, strongest.candidates(robust, default), robust, seconds)
+    truth = hrt.Truth(scene, threads=threads)
+    return LoadedScene(scene, strongest.candidates(robust, default), robust, truth, seconds)
 
 
 def measure_cell(
@@ -138,7 +142,7 @@ def measure_cell(
         result = hrt.trace_hybrid(
             rays, gbuffer, pyramid, stages.tracer, mode=technique.mode, threads=threads
         )
-        found = quality.judge(rays, gbuffer, result, reference)
+        found = quality.judge(rays, gbuffer, result, reference, loaded.truth)
         steps_by_level[technique.name] = result.marched.steps_by_level
         timed = _by_stage(rows, technique.name)
         results.append(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import hybrid_rt as hrt
 import hybrid_rt_scenes as hrs
-from hybrid_rt_bench.spec import Experiment, SceneEntry
+from hybrid_rt_bench.spec_base import SceneEntry, SceneExperiment
 
 
 class NothingToRunError(hrt.HybridRTError):
@@ -54,7 +54,7 @@ class Plan:
 
 
 def make_plan(
-    experiment: Experiment,
+    experiment: SceneExperiment,
     scenes: Sequence[str] | None = None,
     cameras: Sequence[str] | None = None,
 ) -> Plan:
@@ -62,7 +62,7 @@ def make_plan(
 
     Parameters
     ----------
-    experiment : Experiment
+    experiment : SceneExperiment
     scenes : sequence of str, optional
         Names or paths of mesh files, in place of the experiment's scenes.
     cameras : sequence of str, optional
@@ -103,7 +103,7 @@ def find_scene(name: str) -> hrs.SceneSpec:
     return hrs.get_scene(name)
 
 
-def _entries(experiment: Experiment, scenes: Sequence[str] | None) -> list[SceneEntry]:
+def _entries(experiment: SceneExperiment, scenes: Sequence[str] | None) -> list[SceneEntry]:
     if scenes is None:
         return experiment.scenes
     known = {entry.name: entry for entry in experiment.scenes}
@@ -128,7 +128,7 @@ def _available(entry: SceneEntry, plan: Plan, *, allow_stand_in: bool) -> hrs.Sc
 def _camera_names(
     entry: SceneEntry,
     spec: hrs.SceneSpec,
-    experiment: Experiment,
+    experiment: SceneExperiment,
     cameras: Sequence[str] | None,
 ) -> tuple[str, ...]:
     if cameras is not None:

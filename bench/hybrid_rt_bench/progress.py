@@ -23,13 +23,13 @@ class Reporter:
             TextColumn("{task.description}"),
             BarColumn(),
             MofNCompleteColumn(),
-            TextColumn("rounds"),
+            TextColumn("{task.fields[unit]}"),
             TimeRemainingColumn(),
             console=console,
             transient=True,
             disable=not console.is_terminal,
         )
-        self._task = self._bar.add_task("starting", total=None)
+        self._task = self._bar.add_task("starting", total=None, unit="rounds")
 
     def __enter__(self) -> Reporter:
         self._bar.start()
@@ -43,17 +43,17 @@ class Reporter:
     ) -> None:
         self._bar.stop()
 
-    def total(self, rounds: int) -> None:
+    def total(self, amount: float, unit: str = "rounds") -> None:
         """Set the length of the bar."""
-        self._bar.update(self._task, total=rounds)
+        self._bar.update(self._task, total=amount, unit=unit)
 
     def doing(self, what: str) -> None:
         """Say what is going on."""
         self._bar.update(self._task, description=what)
 
-    def advance(self, rounds: int = 1) -> None:
-        """Count finished rounds."""
-        self._bar.advance(self._task, rounds)
+    def advance(self, amount: float = 1) -> None:
+        """Count what is finished."""
+        self._bar.advance(self._task, amount)
 
     def say(self, text: str, style: str = "") -> None:
         """Print a line that stays."""

@@ -38,6 +38,7 @@ def judge(
     gbuffer: hrt.GBuffer,
     result: hrt.HybridResult,
     reference: hrt.Hits,
+    truth: hrt.Truth,
 ) -> Quality:
     """Return alpha, the rate of every verdict with its interval, and the errors in t and pixels."""
     judged = metrics.judge(
@@ -48,6 +49,7 @@ def judge(
         gbuffer.scene,
         gbuffer.camera,
         pixel=result.pixel,
+        truth=truth,
     )
     rates = metrics.rates(judged)
     wrong = np.isin(judged.verdict, [metrics.Verdict.FALSE_HIT, metrics.Verdict.FALSE_MISS])
@@ -59,7 +61,7 @@ def judge(
         "alpha": alpha.value,
         "alpha_low": alpha.low,
         "alpha_high": alpha.high,
-        **_rate("wrong", metrics.Rate.of(int(wrong.sum()), n)),
+        **_rate("wrong", hrt.Rate.of(int(wrong.sum()), n)),
     }
     for name, rate in rates.items():
         if name not in ("alpha", "correct"):
@@ -93,7 +95,7 @@ def picture(
     return grey, classes
 
 
-def _rate(name: str, rate: metrics.Rate) -> dict[str, Any]:
+def _rate(name: str, rate: hrt.Rate) -> dict[str, Any]:
     return {
         f"{name}_count": rate.count,
         f"{name}_rate": rate.value,

@@ -55,6 +55,16 @@ HYBRID_STAGES = ("march", "compaction", "fallback", "merge")
 PIXEL_CLASSES = {"background": 0, "right": 1, "unresolved": 2, "wrong": 3}
 """What the pixels of a stored picture say."""
 
+MAP_CLASSES = {
+    "background": 0,
+    "right": 1,
+    "unresolved": 2,
+    "false_hit": 3,
+    "false_miss": 4,
+    "wrong_primitive": 5,
+}
+"""What the pixels of an error map say."""
+
 CELL_KEYS = ("scene", "camera", "width", "height")
 """What tells the cells of a run apart, unless its kind has keys of its own."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,9 @@ import hybrid_rt as hrt
 from hybrid_rt_bench import env, measure, memory, stats
 from hybrid_rt_bench.plan import Plan, PlannedScene, make_plan
 from hybrid_rt_bench.progress import Reporter
-from hybrid_rt_bench.results import ReportsError, RunWriter, create_run
+from hybrid_rt_bench.results import CELL_KEYS, ReportsError, RunWriter, create_run
 from hybrid_rt_bench.spec import Experiment, Resolution
+from hybrid_rt_bench.spec_base import SceneExperiment
 from hybrid_rt_bench.techniques import Technique, get_technique
 
 
@@ -77,13 +78,63 @@ def run_experiment(
     ReportsError
         The folder can no longer be written to.
     """
+    workers = check_threads(threads)
+    techniques = [get_technique(name) for name in experiment.techniques]
+    reporter.doing("reading scenes")
+    plan = make_plan(experiment, scenes, cameras)
+
+    def measure_all(writer: RunWriter) -> None:
+        _measure_all(plan, experiment, techniques, workers, writer, reporter)
+        _warn_of_scatter(writer, reporter)
+
+    return carry_out(
+        experiment,
+        plan,
+        reporter=reporter,
+        threads=workers,
+        out=out,
+        command=command,
+        compile_all=lambda: measure.compile_seconds(experiment, techniques, workers),
+        measure_all=measure_all,
+    )
+
+
+def check_threads(threads: int | None) -> int:
+    """Return how many threads `threads` stands for, None being all that Numba has."""
     most = env.most_threads()
     threads = most if threads is None else threads
     if not 1 <= threads <= most:
         raise hrt.ArgumentError("threads", f"1 to {most} (the cores of this machine)", str(threads))
-    techniques = [get_technique(name) for name in experiment.techniques]
-    reporter.doing("reading scenes")
-    plan = make_plan(experiment, scenes, cameras)
+    return threads
+
+
+def carry_out(
+    experiment: SceneExperiment,
+    plan: Plan,
+    *,
+    reporter: Reporter,
+    threads: int,
+    out: Path,
+    command: Sequence[str],
+    compile_all: Callable[[], dict[str, float]],
+    measure_all: Callable[[RunWriter], None],
+    keys: tuple[str, ...] = CELL_KEYS,
+) -> Outcome:
+    """Make the folder of a run, describe the machine in it, compile, measure, finish.
+
+    Parameters
+    ----------
+    experiment : SceneExperiment
+    plan : Plan
+    reporter, threads, out, command
+        As in `run_experiment`.
+    compile_all : callable
+        Has everything compiled that is to be timed, and returns the seconds of it by name.
+    measure_all : callable
+        Measures all cells and gives them to the writer.
+    keys : tuple of str
+        What tells the cells apart.
+    """
     for note in plan.notes:
         reporter.say(note, "yellow")
     writer = create_run(
@@ -97,13 +148,14 @@ def run_experiment(
             "warnings": [],
             "scenes": [],
         },
+        keys,
     )
     numba.set_num_threads(threads)
     kept = memory.keep_freed()
     try:
         reporter.doing("compiling")
         load = env.load_average()  # before this program adds to it
-        writer.meta["compile_seconds"] = measure.compile_seconds(experiment, techniques, threads)
+        writer.meta["compile_seconds"] = compile_all()
         environment = {
             **env.describe(threads),
             "load_average": load,
@@ -111,9 +163,8 @@ def run_experiment(
         }
         writer.meta["environment"] = environment
         for problem in env.problems(environment):
-            _warn(writer, reporter, problem)
-        _measure_all(plan, experiment, techniques, threads, writer, reporter)
-        _warn_of_scatter(writer, reporter)
+            warn(writer, reporter, problem)
+        measure_all(writer)
     except KeyboardInterrupt:
         writer.finish(interrupted=True)
         return Outcome(writer.folder, writer.measured, len(writer.failed), interrupted=True)
@@ -133,13 +184,13 @@ def _measure_all(
     cells = sum(len(scene.cameras) for scene in plan.scenes) * len(experiment.resolutions)
     reporter.total(cells * a_cell)
     for path, reason in plan.unreadable:
-        _fail(writer, reporter, Path(path).stem, "", None, reason)
+        fail(writer, reporter, Path(path).stem, "", None, reason)
     for planned in plan.scenes:
         reporter.doing(f"loading {planned.spec.name}")
         try:
-            loaded = _load(planned, threads, writer)
+            loaded = load_planned(planned, threads, writer)
         except (hrt.HybridRTError, MemoryError) as error:
-            _fail(writer, reporter, planned.spec.name, "", None, _reason(error))
+            fail(writer, reporter, planned.spec.name, "", None, reason_of(error))
             reporter.advance(len(planned.cameras) * len(experiment.resolutions) * a_cell)
             continue
         for camera in planned.cameras:
@@ -184,7 +235,7 @@ def _measure_one(
         raise
     except Exception as error:  # one bad cell must not cost the others
         reporter.advance(experiment.warmup + experiment.rounds - done)
-        _fail(writer, reporter, planned.spec.name, camera, resolution, _reason(error))
+        fail(writer, reporter, planned.spec.name, camera, resolution, reason_of(error))
         return
     writer.add_cell(
         {**_keys(planned.spec.name, camera, resolution), **record.details},
@@ -201,7 +252,8 @@ def _measure_one(
         )
 
 
-def _load(planned: PlannedScene, threads: int, writer: RunWriter) -> measure.LoadedScene:
+def load_planned(planned: PlannedScene, threads: int, writer: RunWriter) -> measure.LoadedScene:
+    """Load a scene, build its tracers and note it in the run."""
     scene = planned.spec.load(size=planned.size)
     loaded = measure.prepare(scene, threads)
     writer.meta["scenes"].append(
@@ -218,17 +270,19 @@ def _load(planned: PlannedScene, threads: int, writer: RunWriter) -> measure.Loa
     return loaded
 
 
-def _fail(
+def fail(
     writer: RunWriter,
     reporter: Reporter,
     scene: str,
     camera: str,
     resolution: Resolution | None,
     reason: str,
+    **more: Any,
 ) -> None:
-    where = ", ".join(str(part) for part in (scene, camera, resolution) if part)
+    """Say and keep that a cell failed; `more` are its further keys."""
+    where = ", ".join(str(part) for part in (scene, camera, resolution, *more.values()) if part)
     reporter.say(f"failed: {where}: {reason}", "bold red")
-    writer.fail_cell(_keys(scene, camera, resolution), reason)
+    writer.fail_cell({**_keys(scene, camera, resolution), **more}, reason)
 
 
 def _keys(scene: str, camera: str, resolution: Resolution | None) -> dict[str, Any]:
@@ -236,7 +290,8 @@ def _keys(scene: str, camera: str, resolution: Resolution | None) -> dict[str, A
     return {"scene": scene, "camera": camera, "width": width, "height": height}
 
 
-def _warn(writer: RunWriter, reporter: Reporter, text: str) -> None:
+def warn(writer: RunWriter, reporter: Reporter, text: str) -> None:
+    """Say and keep a warning."""
     writer.meta["warnings"].append(text)
     reporter.say(f"warning: {text}", "yellow")
 
@@ -247,7 +302,7 @@ def _warn_of_scatter(writer: RunWriter, reporter: Reporter) -> None:
     if cells:
         worst = max(cells, key=lambda cell: max(cell["unstable"].values()))
         stage = max(worst["unstable"], key=worst["unstable"].__getitem__)
-        _warn(
+        warn(
             writer,
             reporter,
             f"in {len(cells)} of {writer.measured} cells a stage's rounds scatter by more than "
@@ -258,7 +313,8 @@ def _warn_of_scatter(writer: RunWriter, reporter: Reporter) -> None:
         )
 
 
-def _reason(error: BaseException) -> str:
+def reason_of(error: BaseException) -> str:
+    """Return what an exception says, on one line, with its place if it was not made on purpose."""
     if isinstance(error, hrt.HybridRTError):
         return str(error)
     if isinstance(error, MemoryError):

@@ -84,6 +84,35 @@ def reflected_grey(rays: hrt.Rays, hits: hrt.Hits) -> F32:
     return np.clip(grey, 0, 1)
 
 
+def reflection(gbuffer: hrt.GBuffer, rays: hrt.Rays, hits: hrt.Hits) -> F32:
+    """Return the image of what one ray a pixel meets: lit, tinted by object, with a pattern in it.
+
+    The pattern is fixed in the world, with a wavelength of a hundredth of the scene's diagonal, so
+    that an answer on the right surface at the wrong place is seen as well.
+
+    Returns
+    -------
+    (H, W, 3) float32, sRGB in 0 to 1
+        Where no ray starts, an even grey.
+    """
+    scene = gbuffer.scene
+    light = np.empty((len(rays), 3), np.float32)
+    met = hits.prim_id >= 0
+    length = np.linalg.norm(rays.direction, axis=1)
+    up = rays.direction[:, 1] / np.where(length > 0, length, 1)
+    light[:] = SKY * (0.85 + 0.25 * np.clip(up, 0, 1))[:, None]
+    n = _facing(hits.n_g[met], -rays.direction[met])
+    point = rays.origin[met] + hits.t[met, None] * rays.direction[met]
+    low, high = scene.bounds
+    wave = np.sin(point * np.float32(600 / max(float(np.linalg.norm(high - low)), 1e-30)))
+    brightness = 0.24 + 0.2 * (0.5 + 0.5 * n[:, 1]) + 0.4 * np.maximum(n @ SUN, 0)
+    brightness *= 1 + 0.1 * wave.mean(axis=1)
+    light[met] = _tints(scene.object_id[hits.prim_id[met]]) * brightness[:, None]
+    image = np.full((*gbuffer.prim_id.shape, 3), 0.5, np.float32)
+    image[rays.pixel[:, 1], rays.pixel[:, 0]] = np.clip(light, 0, 1) ** np.float32(1 / 2.2)
+    return image
+
+
 def _openness(
     gbuffer: hrt.GBuffer, rays: hrt.Rays, n: F32, tracer: hrt.EmbreeTracer, samples: int
 ) -> F32:

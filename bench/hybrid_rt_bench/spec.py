@@ -15,7 +15,14 @@ from typing import Any, ClassVar, Literal, Self, get_args
 from pydantic import BaseModel, Field, ValidationError
 
 from hybrid_rt.errors import ArgumentError, UnknownNameError
-from hybrid_rt_bench.spec_base import AnyExperiment, Resolution, ResolutionText, SceneEntry
+from hybrid_rt_bench.error_spec import ErrorExperiment
+from hybrid_rt_bench.spec_base import (
+    AnyExperiment,
+    Resolution,
+    ResolutionText,
+    SceneEntry,
+    SceneExperiment,
+)
 
 __all__ = [
     "KINDS",
@@ -29,7 +36,7 @@ __all__ = [
 ]
 
 
-class Experiment(AnyExperiment):
+class Experiment(SceneExperiment):
     """An experiment of kind "paper".
 
     Attributes
@@ -45,12 +52,10 @@ class Experiment(AnyExperiment):
 
     kind: Literal["paper"] = "paper"
     techniques: list[str] = Field(min_length=1)
-    scenes: list[SceneEntry] = Field(min_length=1)
     resolutions: list[ResolutionText] = Field(min_length=1)
     picture: ResolutionText
     rounds: int = Field(ge=1)
     warmup: int = Field(default=1, ge=0)
-    cameras: int | None = Field(default=None, ge=1)
     derivatives: Literal["plane", "quad"] = "plane"
     selection_rays: int = Field(default=131072, ge=1024)
 
@@ -63,15 +68,8 @@ class Experiment(AnyExperiment):
         order = sorted(resolutions, key=lambda r: r.width * r.height)
         return changed.model_copy(update={"picture": order[len(order) // 2]})
 
-    def row_of(self, scene: str) -> str:
-        """Return the paper's row for a scene given by name on the command line."""
-        for entry in self.scenes:
-            if scene in (entry.name, entry.stand_in):
-                return entry.row
-        return ""
 
-
-KINDS: dict[str, type[AnyExperiment]] = {"paper": Experiment}
+KINDS: dict[str, type[AnyExperiment]] = {"paper": Experiment, "error": ErrorExperiment}
 """The class of each kind of experiment."""
 
 

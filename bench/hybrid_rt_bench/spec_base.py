@@ -105,3 +105,24 @@ class AnyExperiment(BaseModel):
         if resolutions is not None:
             changes["resolutions"] = resolutions
         return self.model_copy(update=changes)
+
+
+class SceneExperiment(AnyExperiment):
+    """An experiment over the cameras of scenes.
+
+    Attributes
+    ----------
+    scenes : list of SceneEntry
+    cameras : int, optional
+        Only the first so many cameras of each scene.
+    """
+
+    scenes: list[SceneEntry] = Field(min_length=1)
+    cameras: int | None = Field(default=None, ge=1)
+
+    def row_of(self, scene: str) -> str:
+        """Return the paper's row for a scene given by name on the command line."""
+        for entry in self.scenes:
+            if scene in (entry.name, entry.stand_in):
+                return entry.row
+        return ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -66,11 +67,16 @@ def candidates(robust: hrt.EmbreeTracer, default: hrt.EmbreeTracer) -> list[Cand
     return found
 
 
+def _intersect(tracer: hrt.EmbreeTracer, rays: hrt.Rays) -> hrt.Hits:
+    return tracer.intersect(rays)
+
+
 def choose(
     contenders: Sequence[Candidate],
     rays: hrt.Rays,
     sample: int,
     *,
+    trace: Callable[[hrt.EmbreeTracer, hrt.Rays], Any] = _intersect,
     clock: Callable[[], float] = time.perf_counter,
 ) -> Choice:
     """Return the candidate that traces `rays` fastest.
@@ -84,17 +90,19 @@ def choose(
     rays : Rays
     sample : int
         How many rays to time, in a few runs of neighbours spread over the whole.
+    trace : callable
+        What is asked of a tracer about the rays; by default the nearest hit.
     """
     few = rays.take(_blocks(len(rays), sample))
     for contender in contenders:  # first touch of the BVH and of the path
-        contender.tracer.intersect(few)
+        trace(contender.tracer, few)
     best = dict.fromkeys(range(len(contenders)), np.inf)
     for rounds, entrants in ((2, len(contenders)), (4, FINALISTS)):
         order = sorted(best, key=best.__getitem__)[:entrants]
         for _ in range(rounds):
             for index in order:
                 start = clock()
-                contenders[index].tracer.intersect(few)
+                trace(contenders[index].tracer, few)
                 best[index] = min(best[index], clock() - start)
     winner = min(best, key=best.__getitem__)
     each = {c.label: float(1e9 * best[i] / max(1, len(few))) for i, c in enumerate(contenders)}

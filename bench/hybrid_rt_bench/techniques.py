@@ -153,6 +153,13 @@ TECHNIQUES = {
             hrt.HiZ(),
             _hiz,
         ),
+        Technique(
+            "certified",
+            "Exact tests against the few primitives that can touch a pixel: only what is proven",
+            "this project",
+            hrt.Certified(),
+            lambda _: [("default", hrt.Certified())],
+        ),
     )
 }
 

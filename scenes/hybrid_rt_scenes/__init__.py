@@ -9,18 +9,22 @@ from hybrid_rt_scenes.registry import (
 )
 from hybrid_rt_scenes.spec import (
     CameraSpec,
+    LightsSpec,
     MeshSpec,
     MissingDataError,
     SceneSpec,
+    automatic_lights,
     data_directory,
 )
 
 __all__ = [
     "CameraSpec",
+    "LightsSpec",
     "MeshSpec",
     "MissingDataError",
     "SceneSpec",
     "automatic_cameras",
+    "automatic_lights",
     "data_directory",
     "get_scene",
     "read_definition",

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 
 import hybrid_rt as hrt
 from hybrid_rt import _check
-from hybrid_rt_scenes.spec import CameraSpec, MeshSpec, SceneSpec
+from hybrid_rt_scenes.spec import CameraSpec, LightsSpec, MeshSpec, SceneSpec
 
 DEFINITIONS = Path(__file__).parent / "definitions"
 
@@ -67,7 +67,9 @@ def _explain(file: str, error: ValidationError) -> hrt.HybridRTError:
     first = found[0]
     where = first["loc"]
     if first["type"] == "extra_forbidden":
-        models: dict[Any, type[BaseModel]] = {"mesh": MeshSpec, "cameras": CameraSpec}
+        models: dict[Any, type[BaseModel]] = {
+            "mesh": MeshSpec, "cameras": CameraSpec, "lights": LightsSpec,
+        }  # fmt: skip
         model = models.get(where[0], SceneSpec) if len(where) > 1 else SceneSpec
         known = set(_keys(model)) - {"name"}
         prefix = ".".join(str(part) for part in where[:-1])

@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
 import hybrid_rt as hrt
@@ -76,6 +77,44 @@ class CameraSpec(_Strict):
         )
 
 
+class LightsSpec(_Strict):
+    """One light of each kind, for shadow rays.
+
+    Attributes
+    ----------
+    sun : three float, world
+        The way in which sunlight travels.
+    point : three float, world
+        Where a small lamp is.
+    area : three times three float, world
+        A corner of a large lamp and the two edges that leave it.
+    """
+
+    sun: Vector
+    point: Vector
+    area: tuple[Vector, Vector, Vector]
+
+    @model_validator(mode="after")
+    def _shine(self) -> LightsSpec:
+        _ = self.directional_light, self.point_light, self.area_light  # refuse what cannot shine
+        return self
+
+    @property
+    def directional_light(self) -> hrt.DirectionalLight:
+        """The sun."""
+        return hrt.DirectionalLight(self.sun)
+
+    @property
+    def point_light(self) -> hrt.PointLight:
+        """The small lamp."""
+        return hrt.PointLight(self.point)
+
+    @property
+    def area_light(self) -> hrt.AreaLight:
+        """The large lamp."""
+        return hrt.AreaLight(*self.area)
+
+
 class MeshSpec(_Strict):
     """Where triangles come from: a file of the data directory, or a generator.
 
@@ -137,6 +176,8 @@ class SceneSpec(_Strict):
         What has to be supplied and where it comes from; empty for a scene generated from code.
     mesh : tuple of MeshSpec
         The meshes that make the scene, in the order of their `prim_id`.
+    lights : LightsSpec, optional
+        None stands for lights placed by the bounds, see `lights_of`.
     cameras : dict of CameraSpec
     """
 
@@ -145,6 +186,7 @@ class SceneSpec(_Strict):
     description: str
     needs: str = ""
     mesh: Annotated[tuple[MeshSpec, ...], Field(min_length=1)]
+    lights: LightsSpec | None = None
     cameras: Annotated[dict[str, CameraSpec], Field(min_length=1)]
     _loaded: hrt.Scene | None = PrivateAttr(default=None)
 
@@ -175,6 +217,10 @@ class SceneSpec(_Strict):
         if name not in self.cameras:
             raise hrt.UnknownNameError(f"camera of scene {self.name!r}", name, self.cameras)
         return self.cameras[name].sized(width, height)
+
+    def lights_of(self, scene: hrt.Scene) -> LightsSpec:
+        """Return the lights of the loaded `scene`: those defined, else `automatic_lights`."""
+        return automatic_lights(scene) if self.lights is None else self.lights
 
     def missing(self, data_dir: Path | None = None) -> str | None:
         """Return a sentence about the first file that is not there, or None when all are.
@@ -223,3 +269,21 @@ class SceneSpec(_Strict):
         folder = data_directory() if data_dir is None else data_dir
         meshes = [mesh.read(folder, size) for mesh in self.mesh]
         return hrt.Scene.from_meshes(meshes, name=self.name)
+
+
+def automatic_lights(scene: hrt.Scene) -> LightsSpec:
+    """Return lights for a scene from its bounds alone, +Y up.
+
+    The lamps hang between the centre and an upper corner, off by (0.2, 0.4, 0.3) of the extent:
+    inside of a room, and outside of a ball. The large one is a square of a twentieth of the
+    diagonal. The sun stands high.
+    """
+    low, high = scene.bounds
+    lamp = (low + high) / 2 + np.array([0.2, 0.4, 0.3]) * (high - low)
+    side = 0.05 * float(np.linalg.norm(high - low))
+    corner = lamp - [side / 2, 0, side / 2]
+    return LightsSpec(
+        sun=(-0.35, -0.87, -0.34),
+        point=tuple(lamp),
+        area=(tuple(corner), (side, 0.0, 0.0), (0.0, 0.0, side)),
+    )

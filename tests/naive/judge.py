@@ -54,8 +54,22 @@ def touch(origin, direction, t_near, t_far, triangle):
     return missed
 
 
-def verdict(origin, direction, t_near, t_far, claim, reference, triangles):
-    """Return (verdict, true t or None); claim and reference are indices, -1 for a miss.
+def nearest(origin, direction, t_near, t_far, triangles):
+    """Return (prim, t, tolerance, nearest graze before t) over all triangles; prim is -1 for none.
+
+    t and the graze are None where there are none; of equal t the least prim counts.
+    """
+    met = [touch(origin, direction, t_near, t_far, triangle) for triangle in triangles]
+    hits = [(t, prim, tolerance) for prim, (s, t, tolerance) in enumerate(met) if s == "hit"]
+    grazes = [t for s, t, _ in met if s == "grazed"]
+    if not hits:
+        return -1, None, None, min(grazes, default=None)
+    t, prim, tolerance = min(hits)
+    return prim, t, tolerance, min((g for g in grazes if g < t), default=None)
+
+
+def verdict(origin, direction, t_near, t_far, claim, reference, triangles, every=False):
+    """Return (verdict, true t or None, whether the reference is wrong); -1 stands for a miss.
 
     The verdict "WRONG" stands for FALSE_HIT or WRONG_PRIMITIVE, which pixels tell apart. The true t
     is "reference" where only the reference's own t is left.
@@ -66,27 +80,27 @@ def verdict(origin, direction, t_near, t_far, claim, reference, triangles):
             return "missed", None, None
         return touch(origin, direction, t_near, t_far, triangles[prim])
 
+    def right(prim, state, t, tolerance):
+        if prim < 0:
+            return first < 0
+        if state == "missed":
+            return False
+        return first < 0 or t <= t_first + max(tolerance, tolerance_first)
+
     c, r = look(claim), look(reference)
-    if claim == reference:
+    if claim == reference and not every:
         if claim < 0:
-            return "CORRECT", None
-        return "CORRECT", "reference" if r[0] == "missed" else r[1]
-    if r[0] == "missed" and c[0] == "missed":
-        if claim < 0:
-            return "REFERENCE_WRONG", None
-        return "WRONG", None if reference < 0 else "reference"
-    if r[0] == "missed":
-        return ("REFERENCE_WRONG" if c[0] == "hit" else "TIE"), c[1]
-    if c[0] == "missed":
-        if claim < 0:
-            return ("FALSE_MISS" if r[0] == "hit" else "TIE"), r[1]
-        return "WRONG", r[1]
-    true = min(c[1], r[1])
-    if abs(c[1] - r[1]) <= max(c[2], r[2]):
-        return "TIE", true
-    if c[1] < r[1]:
-        return ("REFERENCE_WRONG" if c[0] == "hit" else "TIE"), true
-    return ("WRONG" if r[0] == "hit" else "TIE"), true
+            return "CORRECT", None, False
+        return "CORRECT", "reference" if r[0] == "missed" else r[1], False
+    first, t_first, tolerance_first, _ = nearest(origin, direction, t_near, t_far, triangles)
+    c_right, r_right = right(claim, *c), right(reference, *r)
+    if c_right:
+        agree = "CORRECT" if claim == reference else "TIE"
+        true = c[1] if claim >= 0 else (r[1] if r_right else None)
+        return (agree if r_right else "REFERENCE_WRONG"), true, not r_right
+    candidates = [t for t in (t_first, r[1] if r_right else None) if t is not None]
+    kind = "FALSE_MISS" if claim < 0 else "WRONG"
+    return kind, min(candidates, default=None), not r_right
 
 
 def on_screen(camera, point):

@@ -113,7 +113,7 @@ def test_answer_behind_a_grazed_silhouette_is_a_tie(scene):
 
 
 def test_hit_where_nothing_is_is_a_false_hit(scene):
-    verdict, error_t, error_px = judge_one(scene, (0, 0, 1.0), (0, 5.0), MISS, pixel=PIXEL)
+    verdict, error_t, error_px = judge_one(scene, (0, 1.0, 0), (0, 5.0), MISS, pixel=PIXEL)
     assert verdict is Verdict.FALSE_HIT
     assert np.isnan(error_t)
     assert error_px == np.inf
@@ -166,12 +166,13 @@ def test_true_hit_where_the_reference_misses_shows_the_reference_wrong(scene):
 
 
 def test_true_miss_where_the_reference_hits_falsely_shows_the_reference_wrong(scene):
-    assert judge_one(scene, (0, 0, 1.0), MISS, (0, 5.0))[0] is Verdict.REFERENCE_WRONG
+    assert judge_one(scene, (0, 1.0, 0), MISS, (0, 5.0))[0] is Verdict.REFERENCE_WRONG
 
 
 def test_triangle_without_area_is_never_the_truth(scene):
     through = (0.0, 0.0, -1.0)
-    assert judge_one(scene, through, MISS, (6, 2.0))[0] is Verdict.REFERENCE_WRONG
+    short = judge_one(scene, through, MISS, (6, 2.0), t_far=[3.0])
+    assert short[0] is Verdict.REFERENCE_WRONG
     assert judge_one(scene, through, (6, 2.0), (0, 5.0), pixel=(20, 20))[0] is Verdict.FALSE_HIT
 
 
@@ -183,14 +184,62 @@ def test_hits_outside_the_rays_limits_do_not_count(scene):
     )
 
 
-def test_exact_judge_agrees_on_random_claims(scene):
-    """Rays through many edges, vertices and duplicates.
+def test_third_nearer_triangle_that_both_overlook_is_found(scene):
+    """Claim and reference name triangles of the far square, the near one is in front of both."""
+    verdict, error_t, _ = judge_one(scene, DOWN, (2, 10.0), (3, 10.0), pixel=(20, 20))
+    assert verdict is Verdict.FALSE_HIT
+    assert error_t == pytest.approx(1.0)
+    assert judge_one(scene, DOWN, MISS, (2, 10.0))[0] is Verdict.FALSE_MISS
+    assert judge_one(scene, DOWN, (2, 10.0), MISS, pixel=PIXEL)[0] is Verdict.WRONG_PRIMITIVE
 
-    The main axis of each direction is a power of two, so that the judge's quotients are exact, as
-    they must be for a ray straight through an edge.
-    """
+
+def test_reference_that_errs_is_counted_whatever_the_claim(scene):
+    rays = hrt.Rays.from_arrays([(0.0, 0, 0)] * 5, [DOWN] * 5)
+    claimed = hits_of((0, 5.0), (2, 10.0), (2, 10.0), (0, 5.0), MISS)
+    reference = hits_of((2, 10.0), (3, 10.0), (2, 10.0), (0, 5.0), (2, 10.0))
+    resolved = np.array([True, True, True, True, False])
+    judged = hrt.judge(rays, claimed, resolved, reference, scene, CAMERA)
+    assert judged.reference_wrong.tolist() == [True, True, False, False, False]
+    assert [Verdict(v).name for v in judged.verdict] == [
+        "REFERENCE_WRONG", "WRONG_PRIMITIVE", "CORRECT", "CORRECT", "UNRESOLVED"
+    ]  # fmt: skip
+    rate = hrt.rates(judged)["reference_wrong"]
+    assert (rate.count, rate.total) == (2, 4)
+    thorough = hrt.judge(rays, claimed, resolved, reference, scene, CAMERA, every=True)
+    assert thorough.reference_wrong.tolist() == [True, True, True, False, False]
+    assert [Verdict(v).name for v in thorough.verdict] == [
+        "REFERENCE_WRONG", "WRONG_PRIMITIVE", "WRONG_PRIMITIVE", "CORRECT", "UNRESOLVED"
+    ]  # fmt: skip
+
+
+def test_error_of_t_is_taken_from_the_float64_truth(scene):
+    """The nearest float32 is not the true t, and the judge sees by how much it is not."""
+    direction = np.array((0.1, 0.1, -3), np.float32)
+    t = np.float32(5 / 3)
+    _, error_t, _ = judge_one(scene, direction, (0, t), (0, t))
+    assert error_t == pytest.approx(abs(float(t) * 3 / 5 - 1), rel=1e-6)
+    assert error_t > 1e-9
+
+
+def test_truth_is_built_once_and_used_for_many_judgements(scene):
+    truth = hrt.Truth(scene)
+    rays = hrt.Rays.from_arrays([(0.0, 0, 0)], [DOWN])
+    one = np.ones(1, bool)
+    agreed, other = hits_of((0, 5.0)), hits_of((2, 10.0))
+    hrt.judge(rays, agreed, one, agreed, scene, CAMERA, truth=truth)
+    assert "_bvh" not in vars(truth)
+    judged = hrt.judge(rays, agreed, one, other, scene, CAMERA, truth=truth)
+    assert judged.verdict[0] == Verdict.REFERENCE_WRONG
+    tree = vars(truth)["_bvh"]
+    hrt.judge(rays, other, one, agreed, scene, CAMERA, truth=truth)
+    assert vars(truth)["_bvh"] is tree
+
+
+@pytest.mark.parametrize("every", [False, True])
+def test_exact_judge_agrees_on_random_claims(scene, every):
+    """Rays through many edges, vertices and duplicates."""
     rng = np.random.default_rng(7)
-    n = 1500
+    n = 800
     origin = rng.integers(-2, 3, (n, 3)).astype(np.float32)
     direction = rng.integers(-8, 9, (n, 3)).astype(np.float32)
     direction[np.arange(n), rng.choice(3, n, p=[0.1, 0.1, 0.8])] = rng.choice([-8, 8], n)
@@ -202,12 +251,16 @@ def test_exact_judge_agrees_on_random_claims(scene):
     claim, ref = (hits_of(*[(p, 1.0 if p >= 0 else np.inf) for p in rng.integers(-1, 7, n)])
                   for _ in range(2))  # fmt: skip
     pixel = rng.integers(-1, 60, (n, 2)).astype(np.int32)
-    judged = hrt.judge(rays, claim, np.ones(n, bool), ref, scene, CAMERA, pixel)
+    ahead = np.flatnonzero(direction[:, 2] < 0)[::2]  # half of these claim about the right pixel
+    t = (-5 - origin[ahead, 2]) / direction[ahead, 2]
+    points = origin[ahead].astype(float) + t[:, None] * direction[ahead]
+    pixel[ahead] = np.maximum(hrt.project(CAMERA, points)[:, :2], -1)
+    judged = hrt.judge(rays, claim, np.ones(n, bool), ref, scene, CAMERA, pixel, every=every)
     seen = set()
     for i in range(n):
         c, r = int(claim.prim_id[i]), int(ref.prim_id[i])
-        verdict, true = naive.verdict(
-            origin[i], direction[i], t_near[i], t_far[i], c, r, np.array(VERTICES)
+        verdict, true, reference_wrong = naive.verdict(
+            origin[i], direction[i], t_near[i], t_far[i], c, r, np.array(VERTICES), every
         )
         t_true = {"reference": 1.0, None: None}.get(true, true)
         error_px = np.nan
@@ -217,6 +270,7 @@ def test_exact_judge_agrees_on_random_claims(scene):
         if verdict == "WRONG":
             verdict = "WRONG_PRIMITIVE" if error_px <= 1 else "FALSE_HIT"
         assert Verdict(judged.verdict[i]).name == verdict, f"ray {i}: claim {c}, reference {r}"
+        assert judged.reference_wrong[i] == reference_wrong
         seen.add(verdict)
     assert seen == {v.name for v in Verdict} - {"UNRESOLVED"}
 
@@ -257,6 +311,9 @@ def test_no_rays_are_judged_without_complaint(scene):
         ({"pixel": np.zeros((1, 2), np.int32)}, "pixel"),
         ({"pixel_tolerance": 0.0}, "pixel_tolerance"),
         ({"camera": None}, "camera"),
+        ({"truth": "the truth"}, "truth"),
+        ({"truth": hrt.Truth(hrt.Scene.from_arrays(np.eye(3), [[0, 1, 2]]))}, "truth"),
+        ({"every": 2}, "every"),
     ],
 )
 def test_bad_input_is_named(scene, change, named):
@@ -299,7 +356,7 @@ def test_interval_of_a_count_that_cannot_be_is_refused():
 def test_rates_and_statuses_count_what_was_judged():
     verdict = np.array([0, 0, 1, 1, 1, 2, 3, 4, 5, 6], np.uint8)
     error_px = np.array([np.nan, np.nan, 0.2, 5.0, np.nan, 0, np.inf, np.nan, 0.9, 0])
-    judged = hrt.Judged(verdict, np.full(10, np.nan), error_px, 1.0)
+    judged = hrt.Judged(verdict, np.full(10, np.nan), error_px, verdict == 6, 1.0)
     rates = hrt.rates(judged)
     assert (rates["alpha"].count, rates["alpha"].total) == (8, 10)
     assert rates["alpha"].value == pytest.approx(0.8)

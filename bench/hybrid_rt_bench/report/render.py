@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hybrid_rt_bench.report import figures, pictures
+from hybrid_rt_bench.report import error_maps, error_tables, figures, pareto, pictures
 from hybrid_rt_bench.report.table import Table
 from hybrid_rt_bench.report.tables import all_tables
 from hybrid_rt_bench.results import ReportsError, RunData, write_bytes
@@ -29,7 +29,10 @@ class Form:
     figures: tuple[Callable[[RunData, Path], list[Path]], ...]
 
 
-FORMS = {"paper": Form(all_tables, (figures.plots, pictures.figures))}
+FORMS = {
+    "paper": Form(all_tables, (figures.plots, pictures.figures)),
+    "error": Form(error_tables.all_tables, (pareto.plots, error_maps.figures)),
+}
 """The form of each kind of run."""
 
 
