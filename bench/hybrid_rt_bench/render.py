@@ -32,6 +32,7 @@ STATUS_COLOURS = {
     hrt.MarchStatus.NEAR: (0, 158, 115),
     hrt.MarchStatus.EXHAUSTED: (204, 121, 167),
     hrt.MarchStatus.INVALID: (226, 26, 28),
+    hrt.MarchStatus.UNDECIDED: (120, 94, 60),
 }
 STATUS_WORDS = {
     hrt.MarchStatus.HIT: "hit: answered",
@@ -41,6 +42,7 @@ STATUS_WORDS = {
     hrt.MarchStatus.NEAR: "near: towards the observer",
     hrt.MarchStatus.EXHAUSTED: "exhausted: step budget",
     hrt.MarchStatus.INVALID: "invalid",
+    hrt.MarchStatus.UNDECIDED: "undecided: closer than can be told",
 }
 SHEET = 960
 """Width of a picture on a contact sheet."""
