@@ -8,10 +8,10 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from hybrid_rt import _threads
+from hybrid_rt import _threads, modes
 from hybrid_rt.kernels import hybrid as kernels
 from hybrid_rt.march import march
-from hybrid_rt.modes import Mode
+from hybrid_rt.modes import Certified, Mode
 from hybrid_rt.types import (
     I64,
     Bool,
@@ -70,13 +70,16 @@ def trace_hybrid(
     Returns
     -------
     HybridResult
-        N hits of the same kind as a tracer's. Where the march answered, t is the distance to the
+        N hits of the same kind as a tracer's. Where "paper" answered, t is the distance to the
         pixel's tilted plane, and u, v are the barycentrics of that point in the pixel's primitive:
-        a pixel is answered and not a triangle, so they may lie outside [0, 1].
+        a pixel is answered and not a triangle, so they may lie outside [0, 1]. Where "certified"
+        answered, they are those of the hit itself.
 
     Notes
     -----
-    Unresolved rays are traced in their order, so that neighbours stay neighbours. `timings` holds
+    Unresolved rays are traced in their order, so that neighbours stay neighbours; in mode
+    "certified" from where the march has proven them free (`hybrid_rt.kernels.hybrid.handed_over`).
+    `timings` holds
     wall-clock seconds, without JIT compilation only from the second call on.
     """
 
@@ -107,7 +110,8 @@ def trace_hybrid(
     def first() -> Marched:
         return march(rays, gbuffer, pyramid, mode, threads=threads)
 
-    return HybridResult(*_in_stages(rays, first, tracer.intersect, merge, threads))
+    reach = _reach(gbuffer, mode)
+    return HybridResult(*_in_stages(rays, first, reach, tracer.intersect, merge, threads))
 
 
 def occluded_hybrid(
@@ -153,12 +157,22 @@ def occluded_hybrid(
     def first() -> Marched:
         return march(rays, gbuffer, pyramid, mode, any_hit=True, threads=threads)
 
-    return OcclusionResult(*_in_stages(rays, first, tracer.occluded, merge, threads))
+    reach = _reach(gbuffer, mode)
+    return OcclusionResult(*_in_stages(rays, first, reach, tracer.occluded, merge, threads))
+
+
+def _reach(gbuffer: GBuffer, mode: str | Mode) -> float | None:
+    """Return the scene's largest coordinate where rays are handed over, else None."""
+    chosen = modes.named(mode)
+    if isinstance(chosen, Certified) and chosen.hand_over:
+        return float(np.abs(gbuffer.scene.bounds).max())
+    return None
 
 
 def _in_stages(
     rays: Rays,
     first: Callable[[], Marched],
+    reach: float | None,
     trace: Callable[[Rays], Answer],
     merge: Callable[[Marched, I64, Answer], Answer],
     threads: int | None,
@@ -168,7 +182,7 @@ def _in_stages(
     marched = first()
     clock.append(time.perf_counter())
     with _threads.limited(threads):
-        starts, rest = _compact(rays, marched.resolved)
+        starts, rest = _compact(rays, marched, reach)
         clock.append(time.perf_counter())
         traced = trace(rest)
         clock.append(time.perf_counter())
@@ -178,8 +192,12 @@ def _in_stages(
     return merged, marched, {stage: clock[k + 1] - clock[k] for k, stage in enumerate(stages)}
 
 
-def _compact(rays: Rays, resolved: Bool) -> tuple[I64, Rays]:
-    """Return, for each chunk, how many unresolved rays come before it, and the unresolved rays."""
+def _compact(rays: Rays, marched: Marched, reach: float | None) -> tuple[I64, Rays]:
+    """Return, for each chunk, how many unresolved rays come before it, and the unresolved rays.
+
+    With `reach` they start where the march has left them.
+    """
+    resolved = marched.resolved
     counts = np.empty(-(-len(rays) // kernels.CHUNK), np.int64)
     kernels.count_unresolved(resolved, counts)
     m = int(counts.sum())
@@ -194,6 +212,9 @@ def _compact(rays: Rays, resolved: Bool) -> tuple[I64, Rays]:
     kernels.compact(
         resolved,
         starts,
+        reach is not None,
+        marched.t_free,
+        reach or 0.0,
         rays.origin,
         rays.direction,
         rays.pixel,

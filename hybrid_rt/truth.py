@@ -65,7 +65,8 @@ class Nearest:
     t_error : (N,) float64
         Bound of the error of t, at most ``2**-30 * |t|``.
     t_grazed : (N,) float64
-        Where the nearest grazed triangle is met that lies in front of t; infinity for none.
+        Where the nearest grazed triangle is met that lies in front of t; infinity for none. A ray
+        that starts on a surface, but for float32's rounding, grazes it at its start.
     exact : (N,) bool
         Whether exact arithmetic was needed.
     """

@@ -144,7 +144,7 @@ class Scene:
         zero_area = int((np.cross(b - a, c - a) == 0).all(axis=1).sum())
         return cls(v, f, np.concatenate(ids), name, zero_area)
 
-    @property
+    @cached_property
     def bounds(self) -> F64:
         """(2, 3) float64, world: the smallest and the largest corner of the used vertices."""
         used = self.vertices[self.faces.ravel()].astype(np.float64)

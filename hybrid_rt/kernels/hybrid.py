@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from hybrid_rt.kernels._jit import kernel, parallel_kernel
+from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
 
 CHUNK = 4096  # rays counted together
 
@@ -22,10 +22,31 @@ def count_unresolved(resolved, counts):
         counts[chunk] = count
 
 
+HAND_OVER_BACK = 1.0 - 2.0**-8
+HAND_OVER_REACH = 2.0**-16
+
+
+@inlined
+def handed_over(i, origin, direction, t_free, reach):
+    """Return where a tracer in float32 has to start on a ray that is proven free up to t_free.
+
+    The tracer's own t errs, by 3e-7 of t on ordinary triangles and, on large ones that are seen at
+    a grazing angle, by as much of the scene's `reach` over the sine: a hit just behind t_free must
+    not be rejected for it. The first term gives up 0.4 % of what hand-over saves; the second,
+    1.5e-5 of the scene, covers that error down to a quarter of a degree.
+    """
+    o = max(abs(origin[i, 0]), abs(origin[i, 1]), abs(origin[i, 2]))
+    d = max(abs(direction[i, 0]), abs(direction[i, 1]), abs(direction[i, 2]))
+    return t_free[i] * HAND_OVER_BACK - HAND_OVER_REACH * (o + reach) / d
+
+
 @parallel_kernel
 def compact(
     resolved,
     starts,
+    hand_over,
+    t_free,
+    reach,
     origin,
     direction,
     pixel,
@@ -37,7 +58,10 @@ def compact(
     t_near_out,
     t_far_out,
 ):
-    """Copy the unresolved rays together, in their order; starts (chunks,) int64."""
+    """Copy the unresolved rays together, in their order; starts (chunks,) int64.
+
+    With `hand_over` they start where they are no longer known to be free.
+    """
     n = resolved.shape[0]
     for chunk in prange(starts.shape[0]):
         j = starts[chunk]
@@ -49,6 +73,10 @@ def compact(
                 pixel_out[j, 0] = pixel[i, 0]
                 pixel_out[j, 1] = pixel[i, 1]
                 t_near_out[j] = t_near[i]
+                if hand_over:
+                    start = handed_over(i, origin, direction, t_free, reach)
+                    if start > t_near[i]:  # false for the NaN of a ray without direction
+                        t_near_out[j] = start
                 t_far_out[j] = t_far[i]
                 j += 1
 

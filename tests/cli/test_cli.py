@@ -173,7 +173,16 @@ def test_render_writes_a_picture(tmp_path, what):
 def test_list_and_info_tell_what_is_there():
     listed, told = shell("list"), shell("info")
     assert (listed.returncode, told.returncode) == (0, 0)
-    for word in ("sphere", "sponza", "front", "built in", "paper", "slope", "thickness 0.5 %"):
+    for word in (
+        "sphere",
+        "sponza",
+        "front",
+        "built in",
+        "paper",
+        "slope",
+        "thickness 0.5 %",
+        "shadow_area",
+    ):
         assert word in listed.stdout
     for word in ("embree", "threading layer", "numba", "cpu"):
         assert word in told.stdout

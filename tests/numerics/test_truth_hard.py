@@ -224,3 +224,25 @@ def test_scenes_far_from_the_origin(offset):
         if t is not None:
             assert abs(Fraction(found.t[i]) - t) <= Fraction(found.t_error[i])
     assert 10 < (found.prim_id >= 0).sum() < 60
+
+
+def test_rays_in_a_plane_but_for_their_rounding():
+    """t is the quotient of two numbers that cancel almost wholly: float64 keeps half its digits."""
+    rng, n, cancelled = np.random.default_rng(7), 300, 0
+    for _ in range(n):
+        triangle = rng.normal(size=(3, 3)).astype(np.float32)
+        a, b, c = triangle.astype(float)
+        target, direction = rng.dirichlet((1, 1, 1)) @ triangle, rng.normal() * (b - a) + c - a
+        rays = hrt.Rays.from_arrays([target - 2 * direction], [direction])
+        truth = hrt.Truth(scene_of([triangle]))
+        found, (state, t) = truth.nearest(rays), truth.touch(rays, [0])
+        own = exact.intersect(rays.origin[0], rays.direction[0], triangle)
+        hit = own is not None and own[0] >= 0
+        assert (found.prim_id[0] == 0) == hit
+        assert (state[0] == 2) == hit
+        if hit:
+            cancelled += bool(found.exact[0])
+            assert found.t_error[0] <= 2.0**-30 * found.t[0]
+            assert abs(Fraction(found.t[0]) - own[0]) <= Fraction(found.t_error[0])
+            assert t[0] == pytest.approx(float(own[0]), rel=1e-9)
+    assert cancelled > 10

@@ -105,6 +105,54 @@ def test_invalid_rays_hit_nothing(case):
     assert np.isinf(result.hits.t).all()
 
 
+@pytest.fixture(scope="module")
+def certain():
+    scene, _ = room()
+    camera = hrt.Camera.look_at((0, 0.4, 2.5), (0, 0, 0), width=160, height=120, near=0.05)
+    buffer = hrt.rasterize(scene, camera, lists=4)
+    rays = hrt.mirror_rays(buffer)
+    pyramid = hrt.build_depth_pyramid(buffer, conservative=True)
+    return scene, buffer, rays, pyramid, hrt.EmbreeTracer(scene)
+
+
+@pytest.mark.parametrize("hand_over", [False, True])
+def test_certified_is_the_tracer_ties_apart(certain, hand_over):
+    scene, buffer, rays, pyramid, tracer = certain
+    result = hrt.trace_hybrid(rays, buffer, pyramid, tracer, hrt.Certified(hand_over=hand_over))
+    assert 0.2 < result.resolved.mean() < 0.95
+    reference = tracer.intersect(rays)
+    everything = np.ones(len(rays), bool)
+    judged = hrt.judge(rays, result.hits, everything, reference, scene, buffer.camera)
+    right = np.isin(judged.verdict, [hrt.Verdict.CORRECT, hrt.Verdict.TIE])
+    assert right.all()
+    assert (result.hits.prim_id == reference.prim_id).mean() > 0.999
+    same = result.hits.prim_id == reference.prim_id
+    np.testing.assert_allclose(result.hits.t[same], reference.t[same], rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(result.hits.u[same], reference.u[same], atol=1e-3)
+
+
+def test_hand_over_starts_rays_later_and_before_their_hit(certain):
+    _scene, buffer, rays, pyramid, tracer = certain
+    starts = []
+
+    class Recorder:
+        def intersect(self, rest):
+            starts.append(rest)
+            return tracer.intersect(rest)
+
+    for hand_over in (False, True):
+        mode = hrt.Certified(hand_over=hand_over)
+        result = hrt.trace_hybrid(rays, buffer, pyramid, Recorder(), mode)
+    own, handed = starts
+    left = rays.take(~result.resolved)
+    np.testing.assert_array_equal(own.t_near, left.t_near)
+    assert (handed.t_near >= own.t_near).all()
+    assert (handed.t_near > own.t_near).mean() > 0.5
+    assert (handed.t_near <= np.maximum(result.marched.t_free[~result.resolved], own.t_near)).all()
+    true = tracer.intersect(left).t
+    assert (handed.t_near < true).all()
+
+
 def test_an_unknown_mode(case):
     _scene, buffer, rays, pyramid, tracer = case
     with pytest.raises(hrt.ArgumentError, match="mode: expected one of 'paper'"):
