@@ -12,7 +12,15 @@ from hybrid_rt.hybrid import occluded_hybrid, trace_hybrid
 from hybrid_rt.io import read_mesh
 from hybrid_rt.lights import AreaLight, DirectionalLight, Light, PointLight
 from hybrid_rt.march import march
-from hybrid_rt.metrics import Judged, Verdict, alpha, by_status, judge, judge_occlusion, rates
+from hybrid_rt.metrics import (
+    Judged,
+    Verdict,
+    alpha,
+    by_status,
+    judge,
+    judge_occlusion,
+    rates,
+)
 from hybrid_rt.modes import (
     DEFAULT_THICKNESS,
     Certified,

@@ -70,10 +70,11 @@ def trace_hybrid(
     Returns
     -------
     HybridResult
-        N hits of the same kind as a tracer's. Where "paper" answered, t is the distance to the
-        pixel's tilted plane, and u, v are the barycentrics of that point in the pixel's primitive:
-        a pixel is answered and not a triangle, so they may lie outside [0, 1]. Where "certified"
-        answered, they are those of the hit itself.
+        N hits of the same kind as a tracer's. Where the march answered with a hit, t is the mode's
+        (in modes "paper" and "slope" the distance to the pixel's tilted plane), and u, v are the
+        barycentrics of that point, brought to the plane of the pixel's primitive: a pixel is
+        answered and not a triangle, so they may lie outside [0, 1]. Mode "certified" answers with
+        the hit itself.
 
     Notes
     -----

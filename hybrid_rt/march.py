@@ -27,13 +27,13 @@ def march(
     gbuffer : GBuffer
     pyramid : DepthPyramid or SlopePyramid
         Of `gbuffer`. A SlopePyramid is for mode "slope" only, which makes its own, within the call,
-        where it gets a DepthPyramid.
-    mode : {"paper", "linear", "dda", "hiz", "slope", "certified"} or a mode object
-        The technique, one of `Paper`, `Linear`, `PixelDDA`, `HiZ`, `SlopeAware`,
-        `Certified`; see `hybrid_rt.modes`. A name stands for its default parameters.
+        where it gets a DepthPyramid; a conservative one for mode "certified" only.
+    mode : {"paper", "certified", "slope", "linear", "dda", "hiz"} or a mode object
+        The technique, one of `Paper`, `Certified`, `SlopeAware`, `Linear`, `PixelDDA`, `HiZ`; see
+        `hybrid_rt.modes`. A name stands for its default parameters.
     any_hit : bool
-        Whether any hit answers a ray and not only its nearest. For techniques whose first hit is
-        their answer, all but "certified", this changes nothing.
+        Whether any hit answers a ray and not only its nearest. In all modes but "certified" the
+        first hit is the answer, and this changes nothing.
     threads : int, optional
         Default: as many as Numba is set to.
 
@@ -67,8 +67,6 @@ def march(
     assert isinstance(pyramid, DepthPyramid)
     if isinstance(chosen, Certified):
         return certified.march(rays, gbuffer, pyramid, chosen, any_hit, threads)
-    if pyramid.conservative:
-        raise ArgumentError("pyramid", "one of the depths at pixel centres", "a conservative one")
     if isinstance(chosen, Linear):
         return linear.march(rays, gbuffer, pyramid, chosen, threads)
     if isinstance(chosen, PixelDDA):
@@ -89,3 +87,6 @@ def _check_pyramid(pyramid: Pyramid, gbuffer: GBuffer, mode: Mode) -> None:
             f"the pyramid of the G-buffer, {width} by {height} pixels at level 0",
             f"one of {pyramid.widths[0]} by {pyramid.heights[0]}",
         )
+    conservative = isinstance(pyramid, DepthPyramid) and pyramid.conservative
+    if conservative and not isinstance(mode, Certified):
+        raise ArgumentError("pyramid", "one of the depths at pixel centres", "a conservative one")

@@ -46,6 +46,40 @@ class Paper:
 
 
 @dataclass(frozen=True)
+class Certified:
+    """Answers only what is proven, "certified": never a wrong hit, never a wrong miss.
+
+    Depths of whole pixel squares instead of pixel centres prove free space; where a square may hold
+    something as near as the ray, the ray is intersected with the primitives of the pixel's list in
+    float64 with error bounds; a ray is answered when nothing nearer than its hit is left, or
+    nothing at all up to infinity, its t_far or the scene's bounds. docs/certified.md has the proof.
+
+    It reads a G-buffer with `lists` and a conservative pyramid (`rasterize(..., lists=8)`,
+    `build_depth_pyramid(..., conservative=True)`). What of these is missing is made at each call,
+    with lists of 8.
+
+    Attributes
+    ----------
+    max_tests : int
+        Budget of exact tests of a ray, >= 1; a ray that needs more is unresolved.
+    max_steps : int, optional
+        Step budget of a ray. By default 2 (W + H) + 64, which no ray can use up.
+    hand_over : bool
+        Whether `hybrid_rt.trace_hybrid` starts unresolved rays where the proof ended.
+    """
+
+    max_tests: int = 64
+    max_steps: int | None = None
+    hand_over: bool = True
+
+    def __post_init__(self) -> None:
+        _check.integer("max_tests", self.max_tests, least=1, most=2**31 - 1)
+        if self.max_steps is not None:
+            _check.integer("max_steps", self.max_steps, least=1, most=2**31 - 1)
+        _check.instance("hand_over", self.hand_over, bool)
+
+
+@dataclass(frozen=True)
 class _Thick:
     """A technique that takes every pixel for a slab of some thickness.
 
@@ -100,8 +134,8 @@ class Linear(_Thick):
     ----------
     .. [1] T. Sousa, N. Kasyan and N. Schulz, "Secrets of CryENGINE 3 Graphics Technology",
        SIGGRAPH 2011, Advances in Real-Time Rendering in Games (real-time local reflections).
-    .. [2] T. Stachowiak, "Stochastic Screen-Space Reflections", SIGGRAPH 2015, Advances in
-       Real-Time Rendering in Games, which gives the linear march and what replaces it.
+    .. [2] T. Stachowiak and Y. Uludag, "Stochastic Screen-Space Reflections", SIGGRAPH 2015,
+       Advances in Real-Time Rendering in Games, which gives the linear march and what replaces it.
     """
 
     stride: float = 0.02
@@ -245,49 +279,15 @@ class SlopeAware:
             _check.integer("max_steps", self.max_steps, least=1, most=2**31 - 1)
 
 
-@dataclass(frozen=True)
-class Certified:
-    """Answers only what is proven, "certified": never a wrong hit, never a wrong miss.
-
-    Depths of whole pixel squares instead of pixel centres prove free space; where a square may hold
-    something as near as the ray, the ray is intersected with the primitives of the pixel's list in
-    float64 with error bounds; a ray is answered when nothing nearer than its hit is left, or
-    nothing at all up to infinity, its t_far or the scene's bounds. docs/certified.md has the proof.
-
-    It reads a G-buffer with `lists` and a conservative pyramid (`rasterize(..., lists=8)`,
-    `build_depth_pyramid(..., conservative=True)`). What of these is missing is made at each call,
-    with lists of 8.
-
-    Attributes
-    ----------
-    max_tests : int
-        Budget of exact tests of a ray, >= 1; a ray that needs more is unresolved.
-    max_steps : int, optional
-        Step budget of a ray. By default 2 (W + H) + 64, which no ray can use up.
-    hand_over : bool
-        Whether `hybrid_rt.trace_hybrid` starts unresolved rays where the proof ended.
-    """
-
-    max_tests: int = 64
-    max_steps: int | None = None
-    hand_over: bool = True
-
-    def __post_init__(self) -> None:
-        _check.integer("max_tests", self.max_tests, least=1, most=2**31 - 1)
-        if self.max_steps is not None:
-            _check.integer("max_steps", self.max_steps, least=1, most=2**31 - 1)
-        _check.instance("hand_over", self.hand_over, bool)
-
-
-Mode = Paper | Linear | PixelDDA | HiZ | SlopeAware | Certified
+Mode = Paper | Certified | Linear | PixelDDA | HiZ | SlopeAware
 
 MODES: dict[str, type[Mode]] = {
     "paper": Paper,
+    "certified": Certified,
     "linear": Linear,
     "dda": PixelDDA,
     "hiz": HiZ,
     "slope": SlopeAware,
-    "certified": Certified,
 }
 """The names that stand for a mode with its default parameters."""
 

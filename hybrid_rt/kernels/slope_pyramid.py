@@ -7,70 +7,71 @@ import math
 import numpy as np
 from numba import prange
 
-from hybrid_rt.kernels._jit import kernel, parallel_kernel
+from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
 
 
-@kernel
-def least_offset(data, children, count, side, slope_x, slope_y):
-    """Return the least value at the parent's centre of a plane of a slope that bounds its children.
+@inlined
+def least_offset(a, bx, by, out_x, out_y, half, slope_x, slope_y):
+    """Return the least value at a parent's centre of a plane of a slope that bounds one child.
 
-    The first `count` rows of children (4, 3) float64 are a row of data and the offset of the
-    child's centre from the parent's; `side` is the length of the child's square, in pixels. Over
-    |u|, |v| <= side / 2 around the child's centre,
-    ``A + sx (ox + u) + sy (oy + v) >= a + bx u + by v`` asks for
-    ``A >= a - sx ox - sy oy + (|bx - sx| + |by - sy|) side / 2``.
+    The child's plane is a, bx, by at its centre, (out_x, out_y) from the parent's, and `half` is
+    half the side of its square. Over |u|, |v| <= half around the child's centre,
+    ``A + sx (out_x + u) + sy (out_y + v) >= a + bx u + by v`` asks for
+    ``A >= a - sx out_x - sy out_y + (|bx - sx| + |by - sy|) half``.
     """
-    least = -math.inf
-    for k in range(count):
-        row = int(children[k, 0])
-        a, bx, by = np.float64(data[row, 0]), np.float64(data[row, 1]), np.float64(data[row, 2])
-        reach = (abs(bx - slope_x) + abs(by - slope_y)) * 0.5 * side
-        least = max(least, a - slope_x * children[k, 1] - slope_y * children[k, 2] + reach)
-    return least
-
-
-@kernel
-def bound_cell(data, target, children, count, side):
-    """Write row `target` of data: a plane in front of `count` children, as in `least_offset`."""
-    if count == 0:
-        data[target, 0] = -np.inf
-        data[target, 1] = 0.0
-        data[target, 2] = 0.0
-        return
-    mean_x, mean_y = 0.0, 0.0
-    for k in range(count):
-        row = int(children[k, 0])
-        mean_x += np.float64(data[row, 1]) / count
-        mean_y += np.float64(data[row, 2]) / count
-    # The offset must bound with the slope as it is stored.
-    slope_x, slope_y = np.float32(mean_x), np.float32(mean_y)
-    tilted = least_offset(data, children, count, side, np.float64(slope_x), np.float64(slope_y))
-    flat = least_offset(data, children, count, side, 0.0, 0.0)
-    if tilted < flat:
-        data[target, 0] = np.nextafter(np.float32(tilted), np.float32(np.inf))
-        data[target, 1] = slope_x
-        data[target, 2] = slope_y
-    else:
-        data[target, 0] = np.nextafter(np.float32(flat), np.float32(np.inf))
-        data[target, 1] = 0.0
-        data[target, 2] = 0.0
+    return a - slope_x * out_x - slope_y * out_y + (abs(bx - slope_x) + abs(by - slope_y)) * half
 
 
 @kernel
 def bound_row(data, y, source, width, height, target, wide, side):
-    """Make row y of the level at `target` from the level (height, width) at `source`."""
-    children = np.empty((4, 3))
+    """Make row y of the level at `target` from the level (height, width) at `source`.
+
+    `side` is the length of a child's square in pixels. An empty child is a plane at minus infinity
+    and asks for nothing.
+    """
+    half = 0.5 * side
+    end_y = min(2 * y + 2, height)
     for x in range(wide):
-        count = 0
-        for j in range(2 * y, min(2 * y + 2, height)):
-            for i in range(2 * x, min(2 * x + 2, width)):
+        end_x = min(2 * x + 2, width)
+        count, mean_x, mean_y = 0, 0.0, 0.0
+        for j in range(2 * y, end_y):
+            for i in range(2 * x, end_x):
                 row = source + j * width + i
-                if data[row, 0] > -np.inf:
-                    children[count, 0] = row
-                    children[count, 1] = (i - 2 * x - 0.5) * side
-                    children[count, 2] = (j - 2 * y - 0.5) * side
-                    count += 1
-        bound_cell(data, target + y * wide + x, children, count, side)
+                count += data[row, 0] > -np.inf
+                mean_x += np.float64(data[row, 1])
+                mean_y += np.float64(data[row, 2])
+        # The offset must bound with the slope as it is stored.
+        slope_x, slope_y = np.float32(0.0), np.float32(0.0)
+        if count > 0:
+            slope_x, slope_y = np.float32(mean_x / count), np.float32(mean_y / count)
+        tilted, flat = -math.inf, -math.inf
+        for j in range(2 * y, end_y):
+            for i in range(2 * x, end_x):
+                row = source + j * width + i
+                a = np.float64(data[row, 0])
+                bx, by = np.float64(data[row, 1]), np.float64(data[row, 2])
+                out_x, out_y = (i - 2 * x - 0.5) * side, (j - 2 * y - 0.5) * side
+                sx, sy = np.float64(slope_x), np.float64(slope_y)
+                tilted = max(tilted, least_offset(a, bx, by, out_x, out_y, half, sx, sy))
+                flat = max(flat, least_offset(a, bx, by, out_x, out_y, half, 0.0, 0.0))
+        cell = target + y * wide + x
+        if tilted < flat:
+            data[cell, 0] = rounded_up(tilted)
+            data[cell, 1] = slope_x
+            data[cell, 2] = slope_y
+        else:
+            data[cell, 0] = rounded_up(flat)
+            data[cell, 1] = 0.0
+            data[cell, 2] = 0.0
+
+
+@inlined
+def rounded_up(value):
+    """Return a float32 that is not less than a float64, minus infinity for itself."""
+    nearest = np.float32(value)
+    if nearest >= value:
+        return nearest
+    return np.nextafter(nearest, np.float32(np.inf))
 
 
 @parallel_kernel

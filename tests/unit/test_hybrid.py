@@ -31,11 +31,12 @@ def case():
     return scene, buffer, rays, hrt.build_depth_pyramid(buffer), hrt.EmbreeTracer(scene)
 
 
-def test_resolved_rays_from_the_march_the_others_from_the_tracer(case):
+@pytest.mark.parametrize("mode", ["paper", "linear", "dda", "hiz", "slope"])
+def test_resolved_rays_from_the_march_the_others_from_the_tracer(case, mode):
     _scene, buffer, rays, pyramid, tracer = case
     assert len(rays) > 3 * CHUNK  # more than one chunk is put together
-    marched = hrt.march(rays, buffer, pyramid)
-    result = hrt.trace_hybrid(rays, buffer, pyramid, tracer)
+    marched = hrt.march(rays, buffer, pyramid, mode)
+    result = hrt.trace_hybrid(rays, buffer, pyramid, tracer, mode)
     resolved = marched.resolved
     assert 0.1 < resolved.mean() < 0.9
     np.testing.assert_array_equal(result.resolved, resolved)
