@@ -42,8 +42,13 @@ def draw(axes, gbuffer, rays, marched, i, reference):
     )
     for k in range(LENGTH):
         shown = np.where(bounds[:, k] > 0, bounds[:, k], np.nan)
-        axes.plot(along, shown, color=plt.cm.Blues(0.95 - 0.18 * k), lw=1.2,
-                  label="bounds of the listed primitives" if k == 0 else None)
+        axes.plot(
+            along,
+            shown,
+            color=plt.cm.Blues(0.95 - 0.18 * k),
+            lw=1.2,
+            label="bounds of the listed primitives" if k == 0 else None,
+        )
     colour = ANSWERED if marched.resolved[i] else STOPPED
     axes.plot(along, depth, color=colour, lw=2, label="the ray")
     hit = hrt.project(gbuffer.camera, hits_point(rays, i, t_hit)[None])[0]
@@ -95,7 +100,14 @@ def main():
         (marched.status == hrt.MarchStatus.HIT, marched.status == hrt.MarchStatus.HIDDEN),
         strict=True,
     ):
-        draw(panel, gbuffer, rays, marched, pick(gbuffer, rays, marched, reference, wanted), reference)
+        draw(
+            panel,
+            gbuffer,
+            rays,
+            marched,
+            pick(gbuffer, rays, marched, reference, wanted),
+            reference,
+        )
     axes[0].set_ylabel("depth = near / z, nearer is higher")
     axes[0].legend(loc="upper right", fontsize=8, frameon=False)
     target = Path(__file__).with_suffix(".png")
