@@ -79,6 +79,9 @@ def run(
     rounds: Annotated[
         int | None, typer.Option("--rounds", help="Measured rounds of each cell.")
     ] = None,
+    cases: Annotated[
+        str | None, typer.Option("--cases", help="Hard cases by name, for `run stability`.")
+    ] = None,
     threads: Threads = None,
     out_dir: OutDir = Path("reports"),
     as_json: Annotated[
@@ -103,18 +106,19 @@ def run(
     * `hybrid-rt run paper --scenes sponza --cameras nave --resolutions 1920x1080 --rounds 15`
 
     * `hybrid-rt run paper --scenes hall.glb --json > hall.json` - a mesh file of your own
+
+    * `hybrid-rt run stability` - the hard set: which technique answers wrongly on which case
     """
     from hybrid_rt_bench.kinds import RUNNERS
     from hybrid_rt_bench.progress import Reporter
 
     spec = load_experiment(experiment, quick=quick)
-    given = {"scenes": scenes, "cameras": cameras, "resolutions": resolutions, "rounds": rounds}
+    picks = {"scenes": scenes, "cameras": cameras, "cases": cases}
+    given = {**picks, "resolutions": resolutions, "rounds": rounds}
     _check_options(spec, [name for name, value in given.items() if value is not None])
     spec = _overridden(spec, resolutions, rounds)
     picked = {
-        name: _names(f"--{name}", value)
-        for name, value in (("scenes", scenes), ("cameras", cameras))
-        if value is not None
+        name: _names(f"--{name}", value) for name, value in picks.items() if value is not None
     }
     reporter = Reporter(err)
     with reporter:

@@ -84,6 +84,21 @@ def most_threads() -> int:
     return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 
 
+def checked_threads(threads: int | None) -> int:
+    """Return the number of threads asked for, by default all.
+
+    Raises
+    ------
+    ArgumentError
+        Fewer than one, or more than Numba was started with.
+    """
+    most = most_threads()
+    threads = most if threads is None else threads
+    if not 1 <= threads <= most:
+        raise hrt.ArgumentError("threads", f"1 to {most} (the cores of this machine)", str(threads))
+    return threads
+
+
 def threading_layer() -> str:
     """Return Numba's threading layer, once a parallel kernel has run."""
     try:

@@ -10,7 +10,7 @@ from typing import Any
 
 import hybrid_rt as hrt
 import hybrid_rt_scenes as hrs
-from hybrid_rt_bench import error_cell
+from hybrid_rt_bench import env, error_cell
 from hybrid_rt_bench.error_spec import ErrorExperiment, WorkloadEntry
 from hybrid_rt_bench.measure import CellError, LoadedScene, prepare
 from hybrid_rt_bench.plan import Plan, PlannedScene, make_plan
@@ -22,7 +22,6 @@ from hybrid_rt_bench.results import ReportsError, RunWriter
 from hybrid_rt_bench.run import (
     Outcome,
     carry_out,
-    check_threads,
     fail,
     load_planned,
     reason_of,
@@ -72,7 +71,7 @@ def run_error(
 
     Parameters, returns and raises: see `hybrid_rt_bench.run.run_experiment`.
     """
-    workers = check_threads(threads)
+    workers = env.checked_threads(threads)
     techniques = {name: get_technique(name) for name in experiment.techniques}
     for entry in experiment.workloads:
         get_workload(entry.name)

@@ -6,10 +6,15 @@ from collections.abc import Callable
 
 from hybrid_rt_bench.error_run import run_error
 from hybrid_rt_bench.run import Outcome, run_experiment
+from hybrid_rt_bench.stability import run_stability
 
 Runner = Callable[..., Outcome]
 
-RUNNERS: dict[str, Runner] = {"paper": run_experiment, "error": run_error}
+RUNNERS: dict[str, Runner] = {
+    "paper": run_experiment,
+    "error": run_error,
+    "stability": run_stability,
+}
 """What runs an experiment of each kind of `hybrid_rt_bench.spec.KINDS`.
 
 A runner takes the experiment and, by name, `reporter`, `threads`, `out`, `command` and those

@@ -78,7 +78,7 @@ def run_experiment(
     ReportsError
         The folder can no longer be written to.
     """
-    workers = check_threads(threads)
+    workers = env.checked_threads(threads)
     techniques = [get_technique(name) for name in experiment.techniques]
     reporter.doing("reading scenes")
     plan = make_plan(experiment, scenes, cameras)
@@ -97,15 +97,6 @@ def run_experiment(
         compile_all=lambda: measure.compile_seconds(experiment, techniques, workers),
         measure_all=measure_all,
     )
-
-
-def check_threads(threads: int | None) -> int:
-    """Return how many threads `threads` stands for, None being all that Numba has."""
-    most = env.most_threads()
-    threads = most if threads is None else threads
-    if not 1 <= threads <= most:
-        raise hrt.ArgumentError("threads", f"1 to {most} (the cores of this machine)", str(threads))
-    return threads
 
 
 def carry_out(

@@ -23,6 +23,7 @@ from hybrid_rt_bench.spec_base import (
     SceneEntry,
     SceneExperiment,
 )
+from hybrid_rt_bench.spec_stability import StabilityExperiment
 
 __all__ = [
     "KINDS",
@@ -69,7 +70,11 @@ class Experiment(SceneExperiment):
         return changed.model_copy(update={"picture": order[len(order) // 2]})
 
 
-KINDS: dict[str, type[AnyExperiment]] = {"paper": Experiment, "error": ErrorExperiment}
+KINDS: dict[str, type[AnyExperiment]] = {
+    "paper": Experiment,
+    "error": ErrorExperiment,
+    "stability": StabilityExperiment,
+}
 """The class of each kind of experiment."""
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hybrid_rt_bench.report import error_maps, error_tables, figures, pareto, pictures
+from hybrid_rt_bench.report import error_maps, error_tables, figures, pareto, pictures, stability
 from hybrid_rt_bench.report.table import Table
 from hybrid_rt_bench.report.tables import all_tables
 from hybrid_rt_bench.results import ReportsError, RunData, write_bytes
@@ -32,6 +32,7 @@ class Form:
 FORMS = {
     "paper": Form(all_tables, (figures.plots, pictures.figures)),
     "error": Form(error_tables.all_tables, (pareto.plots, error_maps.figures)),
+    "stability": Form(stability.tables, (stability.figures,)),
 }
 """The form of each kind of run."""
 
