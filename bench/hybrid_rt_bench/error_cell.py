@@ -28,6 +28,9 @@ from hybrid_rt_bench.results import HYBRID_STAGES, MAP_CLASSES
 EMBREE = "embree"
 """The technique of the rows for Embree itself, at the points "default" and "robust"."""
 
+T_ERRORS = ("error_t_p50", "error_t_p99", "error_t_max")
+"""Columns for the error of t of claimed hits."""
+
 Columns = dict[str, Any]
 
 
@@ -163,7 +166,7 @@ class _Judged:
         counts = np.bincount(verdict, minlength=len(hrt.Verdict))
         found = {name: int(counts[hrt.Verdict[name.upper()]]) for name in VERDICTS}
         n = len(cell.rays)
-        row = {"rays": n, "resolved": n, "alpha": 1.0, **found}
+        row = {"rays": n, "resolved": n, "alpha": 1.0, **found, **dict.fromkeys(T_ERRORS, np.nan)}
         row |= {f"all_{name}": count for name, count in found.items()}
         self.results.append(self._embree_row("robust", {**row, **_wrong_columns(row)}))
 
@@ -192,10 +195,8 @@ def _count_columns(judged: hrt.Judged, resolved: NDArray[np.bool_]) -> Columns:
     row |= _wrong_columns(row)
     errors = judged.error_t[resolved]
     errors = errors[np.isfinite(errors)]
-    p50, p99, most = np.quantile(errors, [0.5, 0.99, 1.0]) if len(errors) else [np.nan] * 3
-    return row | {
-        "error_t_p50": float(p50), "error_t_p99": float(p99), "error_t_max": float(most),
-    }  # fmt: skip
+    quantiles = np.quantile(errors, [0.5, 0.99, 1.0]) if len(errors) else np.full(3, np.nan)
+    return row | dict(zip(T_ERRORS, quantiles.tolist(), strict=True))
 
 
 def _wrong_columns(row: Columns) -> Columns:

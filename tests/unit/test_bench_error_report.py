@@ -216,7 +216,7 @@ def test_map_colours_errors_and_keeps_them_when_reduced():
     classes[0, 0:2] = MAP_CLASSES["wrong_primitive"]
     full = error_maps.error_map(grey, classes)
     assert tuple(full[3, 5]) == error_maps.COLOURS["false_hit"]
-    small = error_maps._reduced(grey, classes)
+    small = error_maps._fitted(grey, classes)
     assert small.shape == (2, error_maps.PANEL, 3)
     assert tuple(small[1, 2]) == error_maps.COLOURS["false_hit"]
     assert tuple(small[0, 0]) == error_maps.COLOURS["wrong_primitive"]

@@ -26,7 +26,7 @@ COLOURS = {
     "wrong_primitive": (255, 196, 0),
 }
 PANEL = 800
-"""Width of a panel of a sheet in pixels, at most."""
+"""Width of a panel of a sheet in pixels, at most, and at least half of it."""
 
 
 def figures(run: RunData, folder: Path) -> list[Path]:
@@ -73,7 +73,7 @@ def _sheet(run: RunData, cell: dict[str, Any], grey: U8, classes: dict[str, U8])
     results = defaults(run.results)
     for key in ("scene", "camera", "width", "height", "workload", "seed"):
         results = results[results[key] == cell[key]]
-    maps = {name: _reduced(grey, kinds) for name, kinds in classes.items()}
+    maps = {name: _fitted(grey, kinds) for name, kinds in classes.items()}
     height, width = next(iter(maps.values())).shape[:2]
     columns = min(3, len(maps))
     lines = -(-len(maps) // columns)
@@ -125,11 +125,12 @@ def _caption(technique: str, pooled: Pooled) -> str:
     )
 
 
-def _reduced(grey: U8, classes: U8) -> U8:
-    """Return the map reduced by a whole factor; of several pixels the worst class is kept."""
+def _fitted(grey: U8, classes: U8) -> U8:
+    """Return the map at a panel's size, by a whole factor; of several pixels the worst is kept."""
     factor = -(-grey.shape[1] // PANEL)
     if factor == 1:
-        return error_map(grey, classes)
+        larger = max(1, PANEL // grey.shape[1])
+        return error_map(grey, classes).repeat(larger, axis=0).repeat(larger, axis=1)
     height, width = (n // factor * factor for n in grey.shape)
     blocks = (height // factor, factor, width // factor, factor)
     mean = grey[:height, :width].reshape(blocks).mean(axis=(1, 3)).astype(np.uint8)

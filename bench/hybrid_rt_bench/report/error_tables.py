@@ -322,4 +322,5 @@ def _cells_text(rows: pd.DataFrame) -> str:
 
     cells: Any = rows[[*CELL]].drop_duplicates()
     sizes = dict.fromkeys(f"{w}x{h}" for w, h in zip(cells.width, cells.height, strict=True))
-    return f"{len(cells)} cells: {listed('scene')}; {listed('workload')} rays; {', '.join(sizes)}"
+    count = f"{len(cells)} cell" + ("s" if len(cells) != 1 else "")
+    return f"{count}: {listed('scene')}; {listed('workload')} rays; {', '.join(sizes)}"

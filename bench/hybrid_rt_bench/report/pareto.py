@@ -302,6 +302,7 @@ def _name(figure: Figure, ax: Axes, dots: Sequence[Dot], *, break_even: bool) ->
 def _drawn(ax: Axes, dots: Sequence[Dot]) -> list[Bbox]:
     """Return boxes, in pixels, over the dots, their error bars and the lines that join them."""
     lines = [((100 * dot.error.low, dot.worth), (100 * dot.error.high, dot.worth)) for dot in dots]
+    lines += [((100 * dot.error.value, dot.low), (100 * dot.error.value, dot.high)) for dot in dots]
     for technique in dict.fromkeys(dot.technique for dot in dots if dot.technique != tables.EMBREE):
         mine = [dot for dot in dots if dot.technique == technique]
         places = [(100 * mine[k].error.value, mine[k].worth) for k in _front(mine)]
