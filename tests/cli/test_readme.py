@@ -24,6 +24,8 @@ def test_the_library_example(capsys):
     printed = dict(line.rsplit(maxsplit=1) for line in capsys.readouterr().out.splitlines())
     assert 0.1 < float(printed["alpha"]) < 0.6
     assert float(printed["same primitive"]) > 0.8
+    assert float(printed["certified alpha"]) > float(printed["alpha"])
+    assert float(printed["differs"]) < 10
     ends = ("HIT", "MISS", "OFFSCREEN", "HIDDEN", "NEAR", "EXHAUSTED", "INVALID")
     assert sum(float(printed[end]) for end in ends) == pytest.approx(1, abs=0.005)
 
