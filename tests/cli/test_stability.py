@@ -58,7 +58,7 @@ def test_other_techniques_may_fail(monkeypatch, tmp_path, capsys, only_paper):
     assert (folder / "figures" / "stability.png").stat().st_size > 5000
 
     assert invoke(monkeypatch, "compare", folder, folder) == 2
-    assert "runs with timings" in capsys.readouterr().err
+    assert "of kind 'stability'" in capsys.readouterr().err
 
 
 def test_a_promise_that_certified_breaks_gives_code_3(monkeypatch, tmp_path, capsys, only_paper):
