@@ -22,7 +22,7 @@ from hybrid_rt_bench import image_error, shade, stats, strongest
 from hybrid_rt_bench.measure import LoadedScene
 from hybrid_rt_bench.points import Point, View
 from hybrid_rt_bench.pooling import VERDICTS, WRONG
-from hybrid_rt_bench.queries import Query
+from hybrid_rt_bench.queries import SAMPLED, Query
 from hybrid_rt_bench.results import HYBRID_STAGES, MAP_CLASSES
 
 EMBREE = "embree"
@@ -193,10 +193,11 @@ def _count_columns(judged: hrt.Judged, resolved: NDArray[np.bool_]) -> Columns:
             row[prefix + name] = int(counts[hrt.Verdict[name.upper()]])
     row["alpha"] = row["resolved"] / max(1, row["rays"])
     row |= _wrong_columns(row)
-    errors = judged.error_t[resolved]
-    errors = errors[np.isfinite(errors)]
-    quantiles = np.quantile(errors, [0.5, 0.99, 1.0]) if len(errors) else np.full(3, np.nan)
-    return row | dict(zip(T_ERRORS, quantiles.tolist(), strict=True))
+    errors = np.where(resolved & np.isfinite(judged.error_t), judged.error_t, np.nan)
+    sample, found = errors[::SAMPLED], np.full(3, np.nan)
+    if np.isfinite(sample).any():
+        found = np.array([*np.nanquantile(sample, [0.5, 0.99]), np.nanmax(errors)])
+    return row | dict(zip(T_ERRORS, found.tolist(), strict=True))
 
 
 def _wrong_columns(row: Columns) -> Columns:
