@@ -133,6 +133,8 @@ class _Judged:
             **_count_columns(judged, marched.resolved),
             "steps": float(marched.steps.sum(dtype=np.int64)),
             "prepare_ms": 1e3 * screen.seconds,
+            "lists_mib": 0.0 if screen.lists is None else screen.lists.nbytes / 2**20,
+            "tests": float(marched.tests),
         }
         if self.picture is not None and point.default:
             image = shade.reflection(self.view.gbuffer, cell.rays, claims)
@@ -171,7 +173,7 @@ class _Judged:
         self.results.append(self._embree_row("robust", {**row, **_wrong_columns(row)}))
 
     def _embree_row(self, mode: str, row: Columns) -> Columns:
-        nothing = {"steps": np.nan, "prepare_ms": 0.0}
+        nothing = {"steps": np.nan, "prepare_ms": 0.0, "lists_mib": 0.0, "tests": 0.0}
         return {**_names(EMBREE, mode, mode == "robust"), **row, **nothing}
 
     def _note(self, judged: hrt.Judged) -> None:

@@ -55,6 +55,11 @@ class Screen:
     pyramid: Any
     seconds: float
 
+    @property
+    def lists(self) -> hrt.PrimitiveLists | None:
+        """The lists of primitives, if the G-buffer has any."""
+        return self.gbuffer.lists
+
 
 class View:
     """What one view has on its screen, each form of it made once, when first asked for.
