@@ -1,6 +1,9 @@
 """The report of an error experiment, on a run made of known figures."""
 
+import dataclasses
+
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
@@ -29,6 +32,7 @@ def result_row(technique, point, default, answers, hits, misses, *, timed=True):
         "technique": technique, "point": point, "default": default, "rays": RAYS,
         "resolved": answers, "alpha": answers / RAYS, **counts,
         **{f"all_{name}": counts[name] for name in VERDICTS}, "steps": 20.0 * RAYS,
+        "lists_mib": 8.0 if technique == "certified" else 0.0, "tests": 4.0 * RAYS,
         "prepare_ms": 3.0, "wrong_rate": (hits + misses) / answers, "wrong_low": 0.0,
         "wrong_high": 1.0, "error_t_p50": 1e-5, "error_t_p99": 1e-3, "error_t_max": 0.5,
     }  # fmt: skip
@@ -50,7 +54,7 @@ def embree_row(mode, wrong, seconds):
     samples = [
         {**names, "round": k, "hybrid": seconds, "embree": EMBREE_SECONDS} for k in range(ROUNDS)
     ]
-    row |= {"steps": np.nan, "prepare_ms": 0.0}
+    row |= {"steps": np.nan, "prepare_ms": 0.0, "lists_mib": 0.0, "tests": 0.0}
     return {**row, **_timing_columns(row, samples)}, samples
 
 
@@ -149,6 +153,28 @@ def test_counts_are_of_every_cell_timed_or_counted(run):
     assert [row[0] for row in table.rows] == ["thick", "paper", "certified"]
 
 
+def test_list_lengths_stand_beside_each_other(run):
+    assert error_tables.table_lists(run) == []  # one length alone says nothing
+    rows = run.results
+    long = rows[rows["technique"] == "certified"].assign(point="lists 16", alpha=0.75)
+    both = dataclasses.replace(run, results=pd.concat([rows, long], ignore_index=True))
+    (table,) = error_tables.table_lists(both)
+    assert [row[0] for row in table.rows if len(row) == 1] == ["atrium", "street"]
+    short, long = (row_of(table, f"lists {k}") for k in (8, 16))
+    alpha = "alpha, mean of cameras"
+    assert (short[alpha], long[alpha]) == ("0.500", "0.750")
+    assert (short["exact tests a ray"], short["lists, MiB a view"]) == ("4.00", "8.00")
+
+
+def test_alpha_of_every_camera_at_its_largest_size(run):
+    table = error_tables.table_cameras(run)
+    assert table.columns == ["", "thick", "paper", "certified"]
+    assert table.rows[:3] == [
+        ["atrium"], ["front", "0.600", "0.400", "0.500"],
+        ["atrium, mean", "0.600", "0.400", "0.500"],
+    ]  # fmt: skip
+
+
 def test_it_pays_where_the_interval_lies_above_one(run):
     table = error_tables.table_workloads(run)
     by_name = [row for row in table.rows if len(row) > 1]
@@ -183,7 +209,7 @@ def test_report_writes_every_figure_from_the_files_alone(run):
 def test_an_unfinished_run_is_shown_as_far_as_it_went(tmp_path):
     run = results.load_run(write_run(tmp_path, scenes=("atrium",), finish=False))
     tables = error_tables.all_tables(run)
-    assert len(tables) == 7
+    assert len(tables) == 8
     assert all(table.rows for table in tables)
 
 

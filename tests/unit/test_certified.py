@@ -153,6 +153,17 @@ def test_past_the_bounds_of_the_scene_is_a_miss_also_beside_the_screen():
     assert np.isinf(marched.t_free[0])
 
 
+def test_what_lies_before_the_near_plane_is_not_said_to_be_absent():
+    # The triangle at z = 0.05 is in no list. A ray that passes it ends at z = 0.045, before the
+    # wall behind the camera; only stopping at the near plane, z = 0.1, keeps it from being a miss.
+    speck = [(-0.01, -0.01, -0.05), (0.01, -0.01, -0.05), (0, 0.01, -0.05)]
+    scene = scene_of(wall(), wall(1), speck)
+    marched = march_one(scene, (0, 0, -1), (0, 0, 1), t_far=0.955)
+    assert marched.status[0] == S.NEAR
+    assert marched.t_free[0] <= 0.9
+    assert march_one(scene, (0, 0, -1), (0, 0, 1), t_far=0.85).status[0] == S.MISS
+
+
 def test_a_hit_on_the_scenes_border_counts():
     floor = scene_of([(-3, -1, -6), (3, -1, -6), (0, -1, -1)])
     marched = march_one(floor, (0, 0, -3), (0, -1, 0))

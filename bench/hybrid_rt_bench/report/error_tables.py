@@ -23,6 +23,8 @@ def all_tables(run: RunData) -> list[Table]:
         table_scenes(run),
         table_workloads(run),
         table_counts(run),
+        *table_lists(run),
+        table_cameras(run),
         table_status(run),
         table_t_error(run),
         *table_image(run),
@@ -161,6 +163,62 @@ def table_counts(run: RunData) -> Table:
         "Every cell, timed or counted, each technique with its default parameters. At most: the "
         "upper end of the 95 % interval; 3 / N for a count of zero."
     )
+    return table
+
+
+def table_lists(run: RunData) -> list[Table]:
+    """Return what longer lists of primitives answer and cost, if there is more than one length."""
+    rows = run.results
+    rows = rows[
+        (rows["lists_mib"] > 0) & rows["timed"] & (rows["workload"] == rows["workload"].iloc[0])
+    ]
+    if rows["point"].nunique() < 2:
+        return []
+    table = Table(
+        "How long a list of primitives pays",
+        [
+            "", "alpha, mean of cameras", "exact tests a ray", "steps a ray", "lists, MiB a view",
+            "making them, ms a view", "march, Mrays/s", "speed-up, measured",
+        ],
+    )  # fmt: skip
+    for (scene,), part in pools(rows, ["scene"]).items():
+        table.rows.append([scene])
+        for (technique, point), pooled in pools(part.rows, POINT).items():
+            table.rows.append(
+                [
+                    point,
+                    number(pooled.mean("alpha")),
+                    number(pooled.rows["tests"].sum() / pooled.rays),
+                    number(pooled.steps_per_ray),
+                    number(pooled.mean("lists_mib")),
+                    number(pooled.mean("prepare_ms")),
+                    number(march_rate(technique, pooled)),
+                    speedup_text(pooled.speedup(run.samples)),
+                ]
+            )
+    table.notes += [
+        f"{_cells_text(rows)}. A list takes 8 bytes a primitive and 4 for the bound of the rest, "
+        "for every pixel, full or not; what does not fit makes rays unresolved, never wrong.",
+        "Making them: raster with lists and the conservative pyramid, less the raster without.",
+    ]
+    return [table]
+
+
+def table_cameras(run: RunData) -> Table:
+    """Return the alpha of every technique's default point at each camera's largest resolution."""
+    rows = defaults(run.results)
+    rows = rows[(rows["workload"] == rows["workload"].iloc[0]) & (rows["technique"] != EMBREE)]
+    rows = rows[rows["height"] == rows.groupby(["scene", "camera"])["height"].transform("max")]
+    names = list(dict.fromkeys(rows["technique"]))
+    table = Table("Alpha, camera by camera", ["", *names], detail=True)
+    for (scene,), part in pools(rows, ["scene"]).items():
+        cameras = part.rows.pivot_table("alpha", "camera", "technique", sort=False)
+        table.rows.append([scene])
+        for camera, alphas in cameras.iterrows():
+            table.rows.append([str(camera), *(number(float(alphas[name])) for name in names)])
+        means = cameras.mean()
+        table.rows.append([f"{scene}, mean", *(number(float(means[name])) for name in names)])
+    table.notes.append(f"{_words(rows['workload'].iloc[0])} rays, default parameters.")
     return table
 
 
