@@ -107,7 +107,8 @@ def face_box(vertices, faces, face, eye, m, near, width, height, margin):
     low_y = np.inf
     high_x = -np.inf
     high_y = -np.inf
-    front = 0
+    perhaps_front = 0
+    surely_front = 0
     left, right, above, below = True, True, True, True
     for k in range(3):
         x, y, z = _relative(vertices, faces[face, k], eye)
@@ -116,22 +117,21 @@ def face_box(vertices, faces, face, eye, m, near, width, height, margin):
         q2, s2 = _row(m, 2, x, y, z)
         e0, e1, e2 = SLACK * s0, SLACK * s1, SLACK * s2
         if q2 + e2 >= near * (1.0 - NEAR_SLACK):
-            front += 1
-            if q2 - e2 < near * (1.0 - NEAR_SLACK):
-                front -= 3  # too close to call: as if it crossed the plane
-            else:
-                px, py = q0 / q2, q1 / q2
-                ex, ey = (e0 + abs(px) * e2) / q2, (e1 + abs(py) * e2) / q2
-                low_x, high_x = min(low_x, px - ex), max(high_x, px + ex)
-                low_y, high_y = min(low_y, py - ey), max(high_y, py + ey)
+            perhaps_front += 1
+        if q2 - e2 >= near * (1.0 - NEAR_SLACK):
+            surely_front += 1
+            px, py = q0 / q2, q1 / q2
+            ex, ey = (e0 + abs(px) * e2) / q2, (e1 + abs(py) * e2) / q2
+            low_x, high_x = min(low_x, px - ex), max(high_x, px + ex)
+            low_y, high_y = min(low_y, py - ey), max(high_y, py + ey)
         # Wholly beside the grown screen, in homogeneous form.
         left &= q0 + e0 + margin * (q2 + e2) < 0.0
         right &= q0 - e0 - (width + margin) * (q2 + e2) > 0.0
         above &= q1 + e1 + margin * (q2 + e2) < 0.0
         below &= q1 - e1 - (height + margin) * (q2 + e2) > 0.0
-    if front == 0 or left or right or above or below:
+    if perhaps_front == 0 or left or right or above or below:
         return False, 0, 0, 0, 0
-    if front != 3:
+    if surely_front != 3:
         return True, 0, 0, width - 1, height - 1
     low_x -= margin
     low_y -= margin

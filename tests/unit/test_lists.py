@@ -111,6 +111,15 @@ def test_a_triangle_across_the_near_plane_is_listed_as_near_as_it_comes():
     assert found.prim_id[7, 3, 0] == -1
 
 
+def test_a_corner_that_rounding_may_put_on_either_side_of_the_near_plane_loses_nothing():
+    camera = hrt.Camera.look_at((0, 0, 0), (0, 0, -1), vfov_deg=90, width=8, height=8, near=1.0)
+    close = 1 - 2.0**-20  # where the lists put the near plane; a float32
+    corners = np.array([(-1.0, -1, -2), (1, -1, -2), (0, 0.5, -close)])
+    found = hrt.rasterize(hrt.Scene.from_arrays(corners, [[0, 1, 2]]), camera, lists=1).lists
+    assert found.prim_id[4, 4, 0] == 0
+    assert found.prim_id[5, 3, 0] == 0
+
+
 def test_a_plane_through_the_eye_is_bounded_by_its_box():
     camera = hrt.Camera.look_at((0, 0, 0), (0, 0, -1), vfov_deg=90, width=8, height=8, near=0.1)
     edge_on = np.array([(-1.0, 0, -2), (1, 0, -2), (0, 0, -4)])
