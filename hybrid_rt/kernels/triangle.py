@@ -115,7 +115,8 @@ def approach(o, ray, vertices, ia, ib, ic):
 
     Closest as seen along the ray: `distance` is measured across the ray's main axis, at most
     sqrt(3) times the true one. A triangle that is hit has distance 0; one that is edge-on or
-    without area is not hit, and its distance is that of its edges.
+    without area is not hit, and its distance is that of its edges. Of points equally close, the
+    nearest along the ray.
     """
     t, _, _ = intersect(o, ray, vertices, ia, ib, ic)
     if not np.isnan(t):
@@ -125,9 +126,9 @@ def approach(o, ray, vertices, ia, ib, ic):
     cx, cy, ct = sheared(o, ray, vertices, ic)
     distance, t = _closest_on_edge(ax, ay, at, bx, by, bt)
     other, other_t = _closest_on_edge(bx, by, bt, cx, cy, ct)
-    if other < distance:
+    if other < distance or (other == distance and other_t < t):
         distance, t = other, other_t
     other, other_t = _closest_on_edge(cx, cy, ct, ax, ay, at)
-    if other < distance:
+    if other < distance or (other == distance and other_t < t):
         distance, t = other, other_t
     return False, distance, t

