@@ -95,16 +95,8 @@ def trace_hybrid(
             marched.t,
             gbuffer.scene.vertices,
             gbuffer.scene.faces,
-            traced.t,
-            traced.prim_id,
-            traced.u,
-            traced.v,
-            traced.n_g,
-            hits.t,
-            hits.prim_id,
-            hits.u,
-            hits.v,
-            hits.n_g,
+            *traced.arrays,
+            *hits.arrays,
         )
         return hits
 
@@ -216,15 +208,7 @@ def _compact(rays: Rays, marched: Marched, reach: float | None) -> tuple[I64, Ra
         reach is not None,
         marched.t_free,
         reach or 0.0,
-        rays.origin,
-        rays.direction,
-        rays.pixel,
-        rays.t_near,
-        rays.t_far,
-        rest.origin,
-        rest.direction,
-        rest.pixel,
-        rest.t_near,
-        rest.t_far,
+        *rays.arrays,
+        *rest.arrays,
     )
     return starts, rest

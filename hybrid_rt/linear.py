@@ -18,11 +18,7 @@ def march(
     with _threads.limited(threads) as workers:
         kernels.march(
             workers,
-            rays.origin,
-            rays.direction,
-            rays.pixel,
-            rays.t_near,
-            rays.t_far,
+            *rays.arrays,
             gbuffer.depth,
             gbuffer.prim_id,
             gbuffer.camera.pixel_from_world,
@@ -32,13 +28,7 @@ def march(
             float(mode.stride),
             mode.refinements,
             mode.max_steps,
-            marched.status,
-            marched.resolved,
-            marched.pixel,
-            marched.prim_id,
-            marched.t,
-            marched.t_free,
-            marched.steps,
+            *marched.rows,
         )
     # Every sample is of the depth buffer itself.
     marched.steps_by_level[:] = 0

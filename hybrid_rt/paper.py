@@ -21,11 +21,7 @@ def march(
         steps_by_level = np.zeros((workers, len(pyramid)), np.int64)
         kernels.march(
             workers,
-            rays.origin,
-            rays.direction,
-            rays.pixel,
-            rays.t_near,
-            rays.t_far,
+            *rays.arrays,
             gbuffer.depth,
             gbuffer.ddx,
             gbuffer.ddy,
@@ -38,13 +34,7 @@ def march(
             gbuffer.camera.near,
             mode.samples,
             max_steps,
-            marched.status,
-            marched.resolved,
-            marched.pixel,
-            marched.prim_id,
-            marched.t,
-            marched.t_free,
-            marched.steps,
+            *marched.rows,
             steps_by_level,
         )
     steps_by_level.sum(axis=0, out=marched.steps_by_level)

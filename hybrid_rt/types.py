@@ -495,6 +495,11 @@ class Rays:
     def __len__(self) -> int:
         return len(self.origin)
 
+    @property
+    def arrays(self) -> tuple[F32, F32, I32, F32, F32]:
+        """All arrays, in the order of the attributes, as kernels take them."""
+        return self.origin, self.direction, self.pixel, self.t_near, self.t_far
+
     def take(self, index: NDArray[Any]) -> Rays:
         """Return the rays selected by an index or boolean array."""
         return Rays(
@@ -549,6 +554,11 @@ class Hits:
             np.empty(n, np.float32),
             np.empty((n, 3), np.float32),
         )
+
+    @property
+    def arrays(self) -> tuple[F32, I32, F32, F32, F32]:
+        """All arrays, in the order of the attributes, as kernels take them."""
+        return self.t, self.prim_id, self.u, self.v, self.n_g
 
     def __len__(self) -> int:
         return len(self.t)
@@ -624,6 +634,19 @@ class Marched:
             np.empty(n, np.float32),
             np.empty(n, np.int32),
             np.empty(levels, np.int64),
+        )
+
+    @property
+    def rows(self) -> tuple[U8, Bool, I32, I32, F32, F32, I32]:
+        """The arrays with a row for each ray, in the order of the attributes, for kernels."""
+        return (
+            self.status,
+            self.resolved,
+            self.pixel,
+            self.prim_id,
+            self.t,
+            self.t_free,
+            self.steps,
         )
 
     def __len__(self) -> int:
