@@ -139,6 +139,23 @@ class _Gep(ir.instructions.Instruction):
         )
 
 
+class _Freeze(ir.instructions.Instruction):
+    """`freeze`, which llvmlite lacks: lanes that are undefined become some number."""
+
+    def __init__(self, parent, value, name=""):
+        super().__init__(parent, value.type, "freeze", [value], name=name)
+
+    def descr(self, buf):
+        """Write the instruction."""
+        (value,) = self.operands
+        buf.append(f"freeze {value.type} {value.get_reference()}\n")
+
+
+def _append(builder, instruction):
+    builder._insert(instruction)
+    return instruction
+
+
 def _call(builder, name, result, arguments):
     """Call an LLVM intrinsic."""
     function = ir.FunctionType(result, [a.type for a in arguments])
@@ -273,7 +290,7 @@ def iota(typingctx, lanes=None):
 
 @intrinsic(prefer_literal=True)
 def first(typingctx, n, lanes=None):
-    """Return the mask of the first n lanes, of none or all if n is out of range: first(n[, lanes])."""
+    """Return the mask of the first n lanes, none or all if n is out of range: first(n[, lanes])."""
     vector = Vector("mask", _lanes(lanes))
     if not isinstance(n, types.Integer):
         raise errors.TypingError(f"first: n must be an integer, got {n}")
@@ -299,7 +316,7 @@ def _first(builder, n, lanes):
 
 
 def _operator(op, builds, result=None):
-    """Give vectors a binary operator: how to build it by group of kinds, and its kind if another."""
+    """Give vectors a binary operator: how to build it by group, and the result's kind if another."""
 
     @infer_global(op)
     class Template(AbstractTemplate):
@@ -477,7 +494,7 @@ def _convert(builder, value, old, new):
         return builder.fpext(value, to) if new.kind == "f64" else builder.fptrunc(value, to)
     if old.group == "float":
         # Frozen: what lies out of range is some number, and not a licence to delete code.
-        return builder.freeze(builder.fptosi(value, to))
+        return _append(builder, _Freeze(builder.block, builder.fptosi(value, to)))
     return builder.sext(value, to) if new.kind == "i64" else builder.trunc(value, to)
 
 
@@ -690,7 +707,7 @@ def gather(typingctx, arr, idx, m, default):
     def generate(context, builder, sig, args):
         base = _pointer(context, builder, sig.args[0], args[0])
         other = _widen(context, builder, args[3], sig.args[3], vector)
-        at = _gep(builder, element, base, args[1])
+        at = _append(builder, _Gep(builder.block, element, base, args[1]))
         typ = ir.VectorType(element, vector.lanes)
         narrow = _to_memory(builder, other, element)
         name = f"llvm.masked.gather.{_suffix(typ)}.v{vector.lanes}p0"
@@ -715,18 +732,12 @@ def scatter(typingctx, arr, idx, v, m):
         base = _pointer(context, builder, sig.args[0], args[0])
         value = _widen(context, builder, args[2], sig.args[2], vector)
         value = _to_memory(builder, value, element)
-        at = _gep(builder, element, base, args[1])
+        at = _append(builder, _Gep(builder.block, element, base, args[1]))
         name = f"llvm.masked.scatter.{_suffix(value.type)}.v{vector.lanes}p0"
         _call(builder, name, ir.VoidType(), [value, at, _align(element), args[3]])
         return context.get_dummy_value()
 
     return types.none(arr, idx, v, m), generate
-
-
-def _gep(builder, element, base, index):
-    instruction = _Gep(builder.block, element, base, index)
-    builder._insert(instruction)
-    return instruction
 
 
 # ---------------------------------------------------------------------------------------------
