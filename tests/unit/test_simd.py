@@ -270,7 +270,7 @@ def test_the_first_lanes_and_their_numbers():
         store(number, 0, iota())
 
     out, number = np.empty(WIDTH, bool), np.empty(WIDTH, np.int32)
-    for n in (*range(-2, WIDTH + 3), 1 << 40, -(1 << 40)):
+    for n in (*range(-2, WIDTH + 3), 1 << 40, (1 << 40) - 1, 1 - (1 << 40)):
         run(n, out, number)
         np.testing.assert_array_equal(out, np.arange(WIDTH) < n)
     np.testing.assert_array_equal(number, np.arange(WIDTH))
