@@ -141,6 +141,22 @@ def leaves_bounds(o, d, low, high):
 
 
 @inlined
+def clip_end(how, s_end, start, stop, z, gz, o, d, low, high):
+    """Return (status, s_end, is anything left) of a ray whose end is drawn in to where it matters.
+
+    After t_far nothing counts, and outside of the scene's bounds there is nothing.
+    """
+    last_t = min(stop, leaves_bounds(o, d, low, high))
+    if start <= last_t < math.inf:
+        s_last = (last_t - start) / (z + (last_t - start) * gz)
+        if s_last >= 0.0 and s_last * BEYOND < s_end:
+            how, s_end = MISS, max(s_last, SHORTEST)
+    if last_t < start:
+        return MISS, s_end, False
+    return how, s_end, True
+
+
+@inlined
 def trusted(o, d, t_near, eye, z, s_end, spread):
     """Is the float64 set-up of a ray exact enough.
 
@@ -201,7 +217,7 @@ def walk(
     best = -1
     best_low, best_high = math.inf, t_far
     best_x, best_y = -1, -1
-    m0, m1, m2, m3 = -1, -1, -1, -1  # primitives tested last
+    m0, m1, m2, m3 = -1, -1, -1, -1  # the primitive tested first, and the three tested last
     cx = clamp(int(x0), 0, width - 1)
     cy = clamp(int(y0), 0, height - 1)
     s = F0
@@ -236,7 +252,10 @@ def walk(
                 if tests == max_tests:
                     return EXHAUSTED, -1, -1, -1, math.inf, s / scale, steps, tests
                 tests += 1
-                m3, m2, m1, m0 = m2, m1, m0, prim
+                if m0 < 0:
+                    m0 = prim
+                else:
+                    m3, m2, m1 = m2, m1, prim
                 found, low, high = test_primitive(
                     o, ray, vertices, faces[prim, 0], faces[prim, 1], faces[prim, 2],
                     t_near, min(t_far, best_high),
@@ -271,7 +290,8 @@ def walk(
             cx = clamp(int(x0 + sx * s), low_cell, high_cell)
         if cx < 0 or cy < 0 or cx >= width or cy >= height:
             return OFFSCREEN, -1, -1, -1, math.inf, s / scale, steps, tests
-        if level < top:
+        # A sibling of the cell just left was blocked as a part of their parent: no use in going up.
+        if level < top and (cx >> (level + 1) != lx >> 1 or cy >> (level + 1) != ly >> 1):
             level += 1
     if best >= 0:
         at_hit = (best_high - t_near) / (z + (best_high - t_near) * gz)
@@ -303,14 +323,11 @@ def march_chunk(
             how, s_end = INVALID, -1.0
         hit_x, hit_y, found, at, s_free, count, tested = -1, -1, -1, math.inf, 0.0, 0, 0
         if s_end >= 0.0:
-            # After t_far nothing counts, and outside of the scene's bounds there is nothing.
-            last_t = min(stop, leaves_bounds(origin[i], direction[i], low, high))
-            if start <= last_t < math.inf:
-                s_last = (last_t - start) / (z + (last_t - start) * gz)
-                if s_last >= 0.0 and s_last * BEYOND < s_end:
-                    how, s_end = MISS, max(s_last, SHORTEST)
-            if last_t < start:
-                how = MISS
+            how, s_end, some = clip_end(
+                how, s_end, start, stop, z, gz, origin[i], direction[i], low, high
+            )
+            if not some:
+                pass
             elif not (s_end < math.inf) or not trusted(
                 origin[i], direction[i], start, eye, z, s_end, spread
             ):

@@ -30,7 +30,18 @@ from __future__ import annotations
 
 from . import operators as operators  # gives Python's operators to Numba
 from ._vector import AVX512, WIDTH, Vector
-from .across import all_, any_, bits, count, extract, insert, reduce_add, reduce_max, reduce_min
+from .across import (
+    all_,
+    any_,
+    bits,
+    count,
+    extract,
+    insert,
+    lowest,
+    reduce_add,
+    reduce_max,
+    reduce_min,
+)
 from .lanewise import (
     absolute,
     bits_i32,
@@ -76,6 +87,7 @@ __all__ = [
     "iota",
     "load",
     "load_masked",
+    "lowest",
     "mask",
     "mask_of_bits",
     "maximum",
