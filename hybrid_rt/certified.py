@@ -56,6 +56,7 @@ def march(
             lists.prim_id,
             lists.nearest,
             lists.rest,
+            lists.planes,
             pyramid.data,
             pyramid.offsets,
             pyramid.widths,

@@ -14,6 +14,7 @@ MARGIN_ULPS = 16
 BATCH_FACES = 1 << 21
 BATCH_ENTRIES = 1 << 26
 CHUNKS = 64
+CHUNK_FACES = 1024
 
 
 def primitive_lists(
@@ -61,4 +62,9 @@ def primitive_lists(
                 tiles_x, lanes, prim_id, nearest, rest,
             )  # fmt: skip
             first = last
-    return PrimitiveLists(prim_id, nearest, rest, margin)
+    planes = np.empty((len(faces), kernels.PLANE_ROW), np.float32)
+    with _threads.limited(threads):
+        kernels.face_planes(
+            vertices, faces, eye, m, frame, near, width, height, margin, CHUNK_FACES, planes
+        )
+    return PrimitiveLists(prim_id, nearest, rest, planes, margin)

@@ -304,12 +304,16 @@ class PrimitiveLists:
         Upper bound of the depth, descending; 0 past the end.
     rest : (H, W) float32
         Upper bound of the depth of everything that is not in the list; 0 if that is nothing.
+    planes : (F, 8) float32
+        For each face of the scene that touches the screen the plane of its depth, with its error;
+        see `hybrid_rt.kernels.lists.face_planes`. NaN where there is none to be trusted.
     margin_px : float
     """
 
     prim_id: I32
     nearest: F32
     rest: F32
+    planes: F32
     margin_px: float
 
     @property
@@ -319,8 +323,8 @@ class PrimitiveLists:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all arrays: 8 K + 4 a pixel."""
-        return int(self.prim_id.nbytes + self.nearest.nbytes + self.rest.nbytes)
+        """Bytes of all arrays: 8 K + 4 a pixel, 32 a face."""
+        return sum(a.nbytes for a in (self.prim_id, self.nearest, self.rest, self.planes))
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,6 +39,7 @@ from numba import prange
 
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
 from hybrid_rt.kernels._queue import fetch_add
+from hybrid_rt.kernels.lists import DEPTH, ERROR, REFERENCE_X, REFERENCE_Y, SLOPE_X, SLOPE_Y
 from hybrid_rt.kernels.screen import (
     CHUNK,
     EXHAUSTED,
@@ -61,6 +62,7 @@ from hybrid_rt.kernels.triangle import frame
 E = 2.0**-53
 U = 2.0**-24
 DEPTH_ULPS = 8.0
+HIGH_ULPS = 16.0
 NO_SLOPE = 2.0**-40
 BEYOND = 1.0 + 2.0**-20
 """A ray's end is put off by this, relative, where it must not come too early."""
@@ -197,9 +199,31 @@ def depth_at(z0, sz, s):
 
 
 @inlined
+def depth_error(depth, dz, s_end):
+    """Return by how much, in float32, `depth_at` is at most too low."""
+    return F(HIGH_ULPS * U * max(depth, depth + dz * s_end))
+
+
+@inlined
+def apart(planes, prim, s, s_exit, x0, y0, z0, sx, sy, sz, z_error):
+    """Is the ray surely in front of a primitive's plane from s to s_exit, or surely behind it.
+
+    Depths are linear in s, so it is enough to look at both ends. NaN, no plane, says no.
+    """
+    a, b, c = planes[prim, SLOPE_X], planes[prim, SLOPE_Y], planes[prim, DEPTH]
+    px, py = planes[prim, REFERENCE_X], planes[prim, REFERENCE_Y]
+    error = planes[prim, ERROR]
+    above = z0 + sz * s - (c + a * (x0 + sx * s - px) + b * (y0 + sy * s - py))
+    then = z0 + sz * s_exit - (c + a * (x0 + sx * s_exit - px) + b * (y0 + sy * s_exit - py))
+    front = min(above, then) > error
+    behind = max(above, then) + z_error < -error
+    return front or behind
+
+
+@inlined
 def walk(
     i, origin, direction, ray, t_near, t_far, status, x, y, depth, dx, dy, dz, s_end, z, gz,
-    prim_id, nearest, rest, cells, offsets, widths, vertices, faces, max_steps, max_tests, any_hit,
+    prim_id, nearest, rest, planes, cells, offsets, widths, vertices, faces, max_steps, max_tests, any_hit,
     steps_by_level,
 ):  # fmt: skip
     """March one ray; return (status, pixel x, pixel y, prim, t, s proven free, steps, tests)."""
@@ -212,12 +236,13 @@ def walk(
     sz = F(dz / scale)
     x0, y0 = F(x), F(y)
     z0 = start_depth(depth, dz, s_end)
+    z_error = depth_error(depth, dz, s_end)
     o = origin[i]
 
     best = -1
     best_low, best_high = math.inf, t_far
     best_x, best_y = -1, -1
-    m0, m1, m2, m3 = -1, -1, -1, -1  # the primitive tested first, and the three tested last
+    last = -1  # the primitive tested last
     cx = clamp(int(x0), 0, width - 1)
     cy = clamp(int(y0), 0, height - 1)
     s = F0
@@ -247,20 +272,19 @@ def walk(
                 if prim < 0 or nearest[cy, cx, k] < lowest:
                     full = False
                     break
-                if prim in (m0, m1, m2, m3):
+                if prim in (last, best) or apart(
+                    planes, prim, s, s_exit, x0, y0, z0, sx, sy, sz, z_error
+                ):
                     continue
                 if tests == max_tests:
                     return EXHAUSTED, -1, -1, -1, math.inf, s / scale, steps, tests
                 tests += 1
-                if m0 < 0:
-                    m0 = prim
-                else:
-                    m3, m2, m1 = m2, m1, prim
+                last = prim
                 found, low, high = test_primitive(
                     o, ray, vertices, faces[prim, 0], faces[prim, 1], faces[prim, 2],
                     t_near, min(t_far, best_high),
                 )  # fmt: skip
-                if found == T_MISS or (found == T_HIT and prim == best):
+                if found == T_MISS:
                     continue
                 # A hit that rounding may put before or after the best one is a tie.
                 if found == T_UNDECIDED or (best >= 0 and high >= best_low):
@@ -305,7 +329,7 @@ def walk(
 
 @kernel
 def march_chunk(
-    first, last, origin, direction, t_near, t_far, prim_id, nearest, rest,
+    first, last, origin, direction, t_near, t_far, prim_id, nearest, rest, planes,
     cells, offsets, widths, vertices, faces, m, eye, near, spread, low, high,
     max_steps, max_tests, any_hit,
     status, resolved, pixel, prim, t, t_free, steps, steps_by_level, tests,
@@ -336,7 +360,7 @@ def march_chunk(
                 how, hit_x, hit_y, found, at, s_free, count, tested = walk(
                     i, origin, direction, frame(direction[i]), start, stop, how,
                     x, y, z0, dx, dy, dz, s_end, z, gz,
-                    prim_id, nearest, rest, cells, offsets, widths, vertices, faces,
+                    prim_id, nearest, rest, planes, cells, offsets, widths, vertices, faces,
                     max_steps, max_tests, any_hit, steps_by_level,
                 )  # fmt: skip
         tests[0] += tested
@@ -359,7 +383,7 @@ def march_chunk(
 
 @parallel_kernel
 def march(
-    workers, origin, direction, t_near, t_far, prim_id, nearest, rest,
+    workers, origin, direction, t_near, t_far, prim_id, nearest, rest, planes,
     cells, offsets, widths, vertices, faces, m, eye, near, spread, low, high,
     max_steps, max_tests, any_hit,
     status, resolved, pixel, prim, t, t_free, steps, steps_by_level, tests,
@@ -372,7 +396,7 @@ def march(
         while first < n:
             march_chunk(
                 first, min(n, first + CHUNK), origin, direction, t_near, t_far,
-                prim_id, nearest, rest, cells, offsets, widths, vertices, faces,
+                prim_id, nearest, rest, planes, cells, offsets, widths, vertices, faces,
                 m, eye, near, spread, low, high, max_steps, max_tests, any_hit,
                 status, resolved, pixel, prim, t, t_free, steps, steps_by_level[worker],
                 tests[worker],

@@ -20,7 +20,24 @@ from numba import prange
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
 from hybrid_rt.kernels._queue import fetch_add
-from hybrid_rt.kernels.certified import BEYOND, DEPTH_ULPS, E, NO_SLOPE, SHORTEST, U
+from hybrid_rt.kernels.certified import (
+    BEYOND,
+    DEPTH_ULPS,
+    HIGH_ULPS,
+    NO_SLOPE,
+    SHORTEST,
+    E,
+    U,
+)
+from hybrid_rt.kernels.lists import (
+    DEPTH,
+    ERROR,
+    PLANE_ROW,
+    REFERENCE_X,
+    REFERENCE_Y,
+    SLOPE_X,
+    SLOPE_Y,
+)
 from hybrid_rt.kernels.screen import (
     EXHAUSTED,
     HIDDEN,
@@ -34,9 +51,12 @@ from hybrid_rt.kernels.screen import (
 
 BATCH = 512
 """Slots; their rows stay in the L2 cache."""
-REFILL = 4
+import os
+import os
+REFILL = int(os.environ.get('RF','4'))
 """Free lanes before new rays are put in."""
-TOGETHER = 6
+TOGETHER = int(os.environ.get('TG','6'))
+LOOK = int(os.environ.get('LK','6'))
 """Waiting lanes before their primitives are tested."""
 
 W = simd.WIDTH
@@ -44,7 +64,7 @@ STRIDE = BATCH + W  # slots in a row: what is loaded past the last one is not us
 
 # Rows of slots, float32: the ray on the screen, the s at which it ends, its origin along the axes
 # of the exact test; then its result: the s up to which it is free, and the end that a hit has set.
-X0, Y0, Z0, SX, SY, SZ, INV_X, INV_Y, END, OX, OY, OZ, R_S, R_END, F32_ROWS = range(15)
+X0, Y0, Z0, SX, SY, SZ, INV_X, INV_Y, END, Z_ERROR, OX, OY, OZ, R_S, R_END, F32_ROWS = range(16)
 # int32: the ray, the pixel where it starts, the axis kz of the exact test, how it ends if it meets
 # nothing; then its result: a status or ARRIVED, best hit and its pixel, steps.
 RAY, CX, CY, KZ, HOW, R_CODE, R_BEST, R_X, R_Y, R_STEPS, I32_ROWS = range(11)
@@ -53,8 +73,8 @@ SCALE, Z, GZ, T_NEAR, T_FAR, SHEAR_X, SHEAR_Y, SHEAR_Z, R_LOW, R_HIGH, F64_ROWS 
 
 # Rows of lanes that only tests use, float32: OX, OY, OZ. int32: the primitive tested first and the
 # three tested last, and those rows of slots.
-L_OX, L_OY, L_OZ, LANE_F32 = range(4)
-L_KZ, L_BEST, L_X, L_Y, L_FIRST, L_LAST, L_TESTS, LANE_I32 = 0, 1, 2, 3, 4, 5, 8, 9
+L_Z_ERROR, L_OX, L_OY, L_OZ, LANE_F32 = range(5)
+L_KZ, L_X, L_Y, L_TESTS, LANE_I32 = range(5)
 L_SCALE, L_Z, L_GZ, L_NEAR, L_SHEAR_X, L_SHEAR_Y, L_SHEAR_Z, L_LOW, L_HIGH, LANE_F64 = range(10)
 
 ARRIVED = -1
@@ -176,7 +196,8 @@ def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_ou
     sx, inv_x = slope_of(delta_x / scale)
     sy, inv_y = slope_of(delta_y / scale)
     x0, y0 = simd.to_f32(x), simd.to_f32(y)
-    z0 = simd.to_f32(depth - DEPTH_ULPS * U * simd.maximum(depth, depth + delta_z * s_end))
+    highest = simd.maximum(depth, depth + delta_z * s_end)
+    z0 = simd.to_f32(depth - DEPTH_ULPS * U * highest)
     walks = walks & live
     put(slots_f, X0, slot, x0, walks)
     put(slots_f, Y0, slot, y0, walks)
@@ -187,6 +208,7 @@ def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_ou
     put(slots_f, INV_X, slot, inv_x, walks)
     put(slots_f, INV_Y, slot, inv_y, walks)
     put(slots_f, END, slot, simd.to_f32(s_end * scale * BEYOND), walks)
+    put(slots_f, Z_ERROR, slot, simd.to_f32(HIGH_ULPS * U * highest), walks)
     put(slots_i, RAY, slot, index, walks)
     cx = simd.minimum(simd.maximum(simd.to_i32(x0), I(0)), I(width - 1))
     cy = simd.minimum(simd.maximum(simd.to_i32(y0), I(0)), I(height - 1))
@@ -296,7 +318,7 @@ def test_primitives(prim, m, corners, kz, ox, oy, oz, shear_x, shear_y, shear_z,
 
 @kernel
 def walk(
-    many, slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d, prim_id, nearest, rest,
+    many, slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d, prim_id, nearest, rest, planes,
     shape, cells, bits, corners, max_steps, max_tests, any_hit,
 ):  # fmt: skip
     """March the rays of slots 0..many-1 to their results; return the number of exact tests.
@@ -312,16 +334,17 @@ def walk(
     inv_x, inv_y, end, s = zero, zero, zero, zero
     cx, cy, level, slot = simd.i32(0), simd.i32(0), simd.i32(0), simd.i32(0)
     code, steps, entry = simd.i32(ARRIVED), simd.i32(0), simd.i32(0)
-    active, waiting, passed, ended = none, none, none, none
+    best, prim = simd.i32(-1), simd.i32(-1)
+    active, looking, testing, passed, ended = none, none, none, none, none
     taken = 0
     tests = 0
     while True:
-        busy = active | waiting
+        busy = active | looking | testing
         idle = W - simd.count(busy)
         if idle == W or (idle >= REFILL and taken < many):
             if simd.any_(ended):
                 put_results(
-                    ended, slot, s, end, code, steps, slots_f, slots_i, slots_d, lanes_i, lanes_d
+                    ended, slot, s, end, code, steps, best, slots_f, slots_i, slots_d, lanes_i, lanes_d
                 )
             fresh = ~busy & (simd.expand(simd.iota(), ~busy, I(W)) < I(min(many - taken, W)))
             x0 = take(slots_f, X0, taken, fresh, x0)
@@ -340,101 +363,107 @@ def walk(
             level = simd.select(fresh, I(0), level)
             code = simd.select(fresh, I(ARRIVED), code)
             steps = simd.select(fresh, I(0), steps)
+            best = simd.select(fresh, I(-1), best)
+            prim = simd.select(fresh, I(-1), prim)
             take_for_tests(taken, fresh, slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d)
             active = active | fresh
             ended = none
             taken += simd.count(fresh)
-            if not simd.any_(active | waiting):
+            if not simd.any_(active | looking | testing):
                 break
         right, down = sx > F(0.0), sy > F(0.0)
         far_x = simd.to_i32(right)
         far_y = simd.to_i32(down)
 
-        if simd.any_(waiting) and (simd.count(waiting) >= TOGETHER or not simd.any_(active)):
+        if simd.any_(testing) and (
+            simd.count(testing) >= TOGETHER or not simd.any_(active | looking)
+        ):
+            tests += simd.count(testing)
+            t_near = simd.load(lanes_d, L_NEAR * W)
+            best_low = simd.load(lanes_d, L_LOW * W)
+            missed, hit, low, high = test_primitives(
+                prim, testing, corners, simd.load(lanes_i, L_KZ * W),
+                simd.to_f64(simd.load(lanes_f, L_OX * W)),
+                simd.to_f64(simd.load(lanes_f, L_OY * W)),
+                simd.to_f64(simd.load(lanes_f, L_OZ * W)),
+                simd.load(lanes_d, L_SHEAR_X * W), simd.load(lanes_d, L_SHEAR_Y * W),
+                simd.load(lanes_d, L_SHEAR_Z * W), t_near, simd.load(lanes_d, L_HIGH * W),
+            )  # fmt: skip
+            # A hit that rounding may put before or after the best one is a tie.
+            unsure = testing & ~missed & (~hit | ((best >= I(0)) & (high >= best_low)))
+            code = simd.select(unsure, I(UNDECIDED), code)
+            ended = ended | unsure
+            hit = testing & hit & ~missed & ~unsure
+            looking = looking | (testing & ~unsure)
+            testing = none
+            if simd.any_(hit):
+                best = simd.select(hit, prim, best)
+                simd.store_masked(lanes_i, L_X * W, cx, hit)
+                simd.store_masked(lanes_i, L_Y * W, cy, hit)
+                simd.store_masked(lanes_d, L_LOW * W, low, hit)
+                simd.store_masked(lanes_d, L_HIGH * W, high, hit)
+                if any_hit:
+                    code = simd.select(hit, I(HIT), code)
+                    ended = ended | hit
+                    looking = looking & ~hit
+                else:
+                    along = high - t_near
+                    at_hit = along / (
+                        simd.load(lanes_d, L_Z * W) + along * simd.load(lanes_d, L_GZ * W)
+                    )
+                    cut = simd.to_f32(at_hit * simd.load(lanes_d, L_SCALE * W) * BEYOND)
+                    # at_hit is negative behind the eye
+                    end = simd.select(hit & (at_hit >= 0.0), simd.minimum(cut, end), end)
+
+        if simd.any_(looking) and (simd.count(looking) >= LOOK or not simd.any_(active)):
             at_x = edge_at(cx + far_x, simd.i32(0), x0, inv_x)
             at_y = edge_at(cy + far_y, simd.i32(0), y0, inv_y)
-            leave = simd.minimum(at_x, at_y)
+            s_exit = simd.maximum(simd.minimum(simd.minimum(at_x, at_y), end), s)
+            z_in, z_out = z0 + sz * s, z0 + sz * s_exit
+            lowest = simd.select(sz < F(0.0), z_out, z_in)
             pixel = cy * I(width) + cx
-            first = pixel * I(length)
-            m0, m1 = simd.load(lanes_i, L_FIRST * W), simd.load(lanes_i, L_LAST * W)
-            m2, m3 = simd.load(lanes_i, (L_LAST + 1) * W), simd.load(lanes_i, (L_LAST + 2) * W)
-            s_exit = simd.maximum(simd.minimum(leave, end), s)
-            lowest = z0 + sz * simd.select(sz < F(0.0), s_exit, s)
-            # To the next primitive of each that is not yet known; over: there is none.
-            seek = waiting
-            over = none
-            full = none
-            prim = simd.i32(-1)
-            while simd.any_(seek):
-                full = full | (seek & (entry == I(length)))
-                seek = seek & ~full
-                prim = simd.gather(prim_id, first + entry, seek, prim)
-                bound = simd.gather(nearest, first + entry, seek, F(0.0))
-                over = over | (seek & ((prim < I(0)) | (bound < lowest)))
-                seek = seek & ~over
-                seek = seek & ((prim == m0) | (prim == m1) | (prim == m2) | (prim == m3))
-                entry = simd.select(seek, entry + I(1), entry)
+            at = pixel * I(length) + entry
+            full = looking & (entry == I(length))
+            there = looking & ~full
+            found = simd.gather(prim_id, at, there, I(-1))
+            bound = simd.gather(nearest, at, there, F(0.0))
+            past = there & ((found < I(0)) | (bound < lowest))
+            there = there & ~past
             if simd.any_(full):
                 others = simd.gather(rest, pixel, full, F(0.0))
                 hidden = full & ~(lowest > others)
                 code = simd.select(hidden, I(HIDDEN), code)
                 ended = ended | hidden
-                waiting = waiting & ~hidden
-                over = over | (full & ~hidden)
-            waiting = waiting & ~over
-            active = active | over
-            passed = passed | over
-            done = simd.load(lanes_i, L_TESTS * W)
-            tired = waiting & (done == I(max_tests))
-            code = simd.select(tired, I(EXHAUSTED), code)
-            ended = ended | tired
-            waiting = waiting & ~tired
-            if simd.any_(waiting):
-                tests += simd.count(waiting)
-                simd.store_masked(lanes_i, L_TESTS * W, done + I(1), waiting)
-                entry = simd.select(waiting, entry + I(1), entry)
-                fill = waiting & (m0 < I(0))
-                simd.store_masked(lanes_i, L_FIRST * W, prim, fill)
-                push = waiting & ~fill
-                simd.store_masked(lanes_i, (L_LAST + 2) * W, m2, push)
-                simd.store_masked(lanes_i, (L_LAST + 1) * W, m1, push)
-                simd.store_masked(lanes_i, L_LAST * W, prim, push)
-                t_near = simd.load(lanes_d, L_NEAR * W)
-                best_low = simd.load(lanes_d, L_LOW * W)
-                best_high = simd.load(lanes_d, L_HIGH * W)
-                missed, hit, low, high = test_primitives(
-                    prim, waiting, corners, simd.load(lanes_i, L_KZ * W),
-                    simd.to_f64(simd.load(lanes_f, L_OX * W)),
-                    simd.to_f64(simd.load(lanes_f, L_OY * W)),
-                    simd.to_f64(simd.load(lanes_f, L_OZ * W)),
-                    simd.load(lanes_d, L_SHEAR_X * W), simd.load(lanes_d, L_SHEAR_Y * W),
-                    simd.load(lanes_d, L_SHEAR_Z * W), t_near, best_high,
-                )  # fmt: skip
-                best = simd.load(lanes_i, L_BEST * W)
-                missed = missed | (hit & (prim == best))
-                unsure = waiting & ~missed & (~hit | ((best >= I(0)) & (high >= best_low)))
-                code = simd.select(unsure, I(UNDECIDED), code)
-                ended = ended | unsure
-                waiting = waiting & ~unsure
-                hit = waiting & ~missed
-                if simd.any_(hit):
-                    simd.store_masked(lanes_i, L_BEST * W, prim, hit)
-                    simd.store_masked(lanes_i, L_X * W, cx, hit)
-                    simd.store_masked(lanes_i, L_Y * W, cy, hit)
-                    simd.store_masked(lanes_d, L_LOW * W, low, hit)
-                    simd.store_masked(lanes_d, L_HIGH * W, high, hit)
-                    if any_hit:
-                        code = simd.select(hit, I(HIT), code)
-                        ended = ended | hit
-                        waiting = waiting & ~hit
-                    else:
-                        along = high - t_near
-                        at_hit = along / (
-                            simd.load(lanes_d, L_Z * W) + along * simd.load(lanes_d, L_GZ * W)
-                        )
-                        cut = simd.to_f32(at_hit * simd.load(lanes_d, L_SCALE * W) * BEYOND)
-                        # at_hit is negative behind the eye
-                        end = simd.select(hit & (at_hit >= 0.0), simd.minimum(cut, end), end)
+                looking = looking & ~hidden
+                past = past | (full & ~hidden)
+            looking = looking & ~past
+            active = active | past
+            passed = passed | past
+            entry = simd.select(there, entry + I(1), entry)
+            there = there & (found != prim) & (found != best)
+            if simd.any_(there):
+                row = found * I(PLANE_ROW)
+                a = simd.gather(planes, row + I(SLOPE_X), there, F(0.0))
+                b = simd.gather(planes, row + I(SLOPE_Y), there, F(0.0))
+                c = simd.gather(planes, row + I(DEPTH), there, F(0.0))
+                px = simd.gather(planes, row + I(REFERENCE_X), there, F(0.0))
+                py = simd.gather(planes, row + I(REFERENCE_Y), there, F(0.0))
+                error = simd.gather(planes, row + I(ERROR), there, F(0.0))
+                above = z_in - (c + a * (x0 + sx * s - px) + b * (y0 + sy * s - py))
+                then = z_out - (c + a * (x0 + sx * s_exit - px) + b * (y0 + sy * s_exit - py))
+                front = simd.minimum(above, then) > error
+                behind = simd.maximum(above, then) + simd.load(lanes_f, L_Z_ERROR * W) < -error
+                there = there & ~(front | behind)
+                done = simd.load(lanes_i, L_TESTS * W)
+                tired = there & (done == I(max_tests))
+                code = simd.select(tired, I(EXHAUSTED), code)
+                ended = ended | tired
+                looking = looking & ~tired
+                there = there & ~tired
+                simd.store_masked(lanes_i, L_TESTS * W, done + I(1), there)
+                prim = simd.select(there, found, prim)
+                testing = testing | there
+                looking = looking & ~there
 
         # One step of every lane that can take one.
         lx, ly = cx >> level, cy >> level
@@ -455,7 +484,7 @@ def walk(
         blocked = new & (near > F(0.0)) & ~(lowest > near)
         stops = blocked & (level == I(0))
         entry = simd.select(stops, I(0), entry)
-        waiting = waiting | stops
+        looking = looking | stops
         active = active & ~stops
         level = simd.select(blocked & ~stops, level - I(1), level)
         free = active & ~blocked
@@ -491,13 +520,11 @@ def take_for_tests(taken, fresh, slots_f, slots_i, slots_d, lanes_f, lanes_i, la
     """Bring what only exact tests need from slots to the lanes of `fresh`."""
     for row in range(LANE_F32):
         simd.store(
-            lanes_f, row * W, take(slots_f, OX + row, taken, fresh, simd.load(lanes_f, row * W))
+            lanes_f, row * W, take(slots_f, Z_ERROR + row, taken, fresh, simd.load(lanes_f, row * W))
         )
     simd.store(
         lanes_i, L_KZ * W, take(slots_i, KZ, taken, fresh, simd.load(lanes_i, L_KZ * W))
     )
-    for row in range(L_BEST, L_TESTS):
-        simd.store_masked(lanes_i, row * W, simd.i32(-1), fresh)
     simd.store_masked(lanes_i, L_TESTS * W, simd.i32(0), fresh)
     for row in range(L_NEAR + 1):
         v = take(slots_d, SCALE + row, taken, fresh, simd.load(lanes_d, row * W))
@@ -511,14 +538,13 @@ def take_for_tests(taken, fresh, slots_f, slots_i, slots_d, lanes_f, lanes_i, la
 
 
 @inlined
-def put_results(ended, slot, s, end, code, steps, slots_f, slots_i, slots_d, lanes_i, lanes_d):
+def put_results(ended, slot, s, end, code, steps, best, slots_f, slots_i, slots_d, lanes_i, lanes_d):
     """Leave the results of the lanes of `ended` in their slots."""
     simd.scatter(slots_f, slot + I(R_S * STRIDE), s, ended)
     simd.scatter(slots_f, slot + I(R_END * STRIDE), end, ended)
     simd.scatter(slots_i, slot + I(R_CODE * STRIDE), code, ended)
     simd.scatter(slots_i, slot + I(R_STEPS * STRIDE), steps, ended)
-    left = simd.bits(ended & (simd.load(lanes_i, L_BEST * W) >= I(0)))
-    best = simd.load(lanes_i, L_BEST * W)
+    left = simd.bits(ended & (best >= I(0)))
     simd.scatter(slots_i, slot + I(R_BEST * STRIDE), best, ended)
     while left:
         lane = simd.lowest(left)
@@ -578,7 +604,7 @@ def write(many, slots_f, slots_i, slots_d, out):
 
 @kernel
 def march_chunk(
-    first, last, rays, size, box, prim_id, nearest, rest, shape, cells, bits, corners,
+    first, last, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits, corners,
     max_steps, max_tests, any_hit, slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d, out,
 ):  # fmt: skip
     """March rays first..last-1; return exact tests."""
@@ -606,7 +632,7 @@ def march_chunk(
                     t_free[i + k] = free[k]
         if many > BATCH - W or i + W >= last:
             tests += walk(
-                many, slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d, prim_id, nearest, rest,
+                many, slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d, prim_id, nearest, rest, planes,
                 shape, cells, bits, corners, max_steps, max_tests, any_hit,
             )  # fmt: skip
             write(many, slots_f, slots_i, slots_d, out)
@@ -619,7 +645,7 @@ CHUNK = 1024
 
 @parallel_kernel
 def march(
-    workers, rays, size, box, prim_id, nearest, rest, shape, cells, bits, corners,
+    workers, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits, corners,
     max_steps, max_tests, any_hit, out, tests,
 ):  # fmt: skip
     """March rays (N, 3); outputs (N,), tests (workers,)."""
@@ -635,7 +661,7 @@ def march(
         first = fetch_add(taken.ctypes.data, CHUNK)
         while first < count:
             tests[worker] += march_chunk(
-                first, min(count, first + CHUNK), rays, size, box, prim_id, nearest, rest, shape,
+                first, min(count, first + CHUNK), rays, size, box, prim_id, nearest, rest, planes, shape,
                 cells, bits, corners, max_steps, max_tests, any_hit,
                 slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d, out,
             )  # fmt: skip

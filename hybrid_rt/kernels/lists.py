@@ -43,14 +43,18 @@ EDGE_ON = 1024.0
 """A plane whose distance from the eye is not certain to one part in a thousand has no slope."""
 CAP = 1.01
 """Depths above 1 lie before the near plane; the hundredth covers the error of the denominator."""
+PLANE_ULPS = 16.0 * 2.0**-24
+"""Error of a depth plane in float32, relative to the sizes of its terms: three roundings of what is
+stored, two of the differences, four of the sum, one of the comparison."""
 TINY = np.float32(1e-37)
 """A bound that is not zero is at least this, where float32 still has all its digits."""
 
 COVER, ALL = 0, 1
 
 # Scratch of one triangle's set-up: three edges (A, B, C, slack), the plane's numerator (A, B, C,
-# slack), its denominator, the nearest depth of the vertices.
-EDGES, PLANE, DENOMINATOR, NEAREST, SETUP = 0, 12, 16, 17, 18
+# slack), its denominator, the nearest depth of the vertices, twice the relative error of the
+# denominator.
+EDGES, PLANE, DENOMINATOR, NEAREST, LOWERED, SETUP = 0, 12, 16, 17, 18, 19
 
 
 @inlined
@@ -199,6 +203,7 @@ def set_up(vertices, faces, face, eye, m, frame, near, width, height, out):
         return ALL
     side = 1.0 if d > 0.0 else -1.0
     out[DENOMINATOR] = side * d - d_slack
+    out[LOWERED] = 2.0 * d_slack / out[DENOMINATOR]
     reach = 0.0
     for k in range(3):
         value = side * near * (nx * frame[k, 0] + ny * frame[k, 1] + nz * frame[k, 2])
@@ -229,6 +234,46 @@ def edge_plane(p0, p1, p2, s0, s1, s2, q0, q1, q2, r0, r1, r2, side, width, heig
     out[at + 3] = SLACK * (
         (s1 * r2 + s2 * r1) * (width + 1) + (s2 * r0 + s0 * r2) * (height + 1) + s0 * r1 + s1 * r0
     )
+
+
+# A row of what `face_planes` writes: slopes, depth at a reference point, that point, error; padded
+# so that no row lies across two cache lines.
+SLOPE_X, SLOPE_Y, DEPTH, REFERENCE_X, REFERENCE_Y, ERROR, PLANE_ROW = 0, 1, 2, 3, 4, 5, 8
+
+
+@parallel_kernel
+def face_planes(vertices, faces, eye, m, frame, near, width, height, margin, chunk, planes):
+    """Write the depth planes of all faces that may touch a pixel, in float32; planes (F, PLANE_ROW).
+
+    In the grown pixels of the face's box, and for a place (x, y) that is off by no more than half of
+    the margin, ``DEPTH + SLOPE_X (x - REFERENCE_X) + SLOPE_Y (y - REFERENCE_Y)`` in float32 errs by
+    less than ERROR. Faces seen edge-on, or beside the screen, have NaN.
+    """
+    for c in prange(-(-len(faces) // chunk)):
+        setup = np.empty(SETUP, np.float64)
+        for face in range(c * chunk, min((c + 1) * chunk, len(faces))):
+            row = planes[face]
+            row[DEPTH] = np.nan
+            some, i0, j0, i1, j1 = face_box(
+                vertices, faces, face, eye, m, near, width, height, margin
+            )
+            if not some:
+                continue
+            kind = set_up(vertices, faces, face, eye, m, frame, near, width, height, setup)
+            if kind != COVER:
+                continue
+            x, y = 0.5 * (i0 + i1 + 1), 0.5 * (j0 + j1 + 1)
+            reach_x, reach_y = 0.5 * (i1 - i0 + 3), 0.5 * (j1 - j0 + 3)
+            # set_up has lowered the denominator by its error, no more than a thousandth of it.
+            d = setup[DENOMINATOR]
+            a, b = setup[PLANE] / d, setup[PLANE + 1] / d
+            at = a * (x - 0.5 * width) + b * (y - 0.5 * height) + setup[PLANE + 2] / d
+            size = abs(at) + abs(a) * reach_x + abs(b) * reach_y
+            error = PLANE_ULPS * size + (abs(a) + abs(b)) * margin + setup[PLANE + 3] / d
+            error += size * setup[LOWERED]
+            row[SLOPE_X], row[SLOPE_Y], row[DEPTH] = a, b, at
+            row[REFERENCE_X], row[REFERENCE_Y] = x, y
+            row[ERROR] = error * (1.0 + 2.0**-20)
 
 
 @inlined

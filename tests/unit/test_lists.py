@@ -77,7 +77,7 @@ def test_descending_and_padded():
     camera = hrt.Camera.look_at((0, 0, 5), (0, 0, 0), width=40, height=30, near=0.1)
     found = hrt.rasterize(scene, camera, lists=4).lists
     assert found.length == 4
-    assert found.nbytes == 40 * 30 * (8 * 4 + 4)
+    assert found.nbytes == 40 * 30 * (8 * 4 + 4) + 150 * 32
     assert (np.diff(found.nearest, axis=2) <= 0).all()
     assert ((found.prim_id < 0) == (found.nearest == 0)).all()
     assert (found.rest <= found.nearest[:, :, 3]).all()
