@@ -46,6 +46,7 @@ from hybrid_rt.kernels.screen import (
     MISS,
     NEAR,
     OFFSCREEN,
+    SKIPPED,
     UNDECIDED,
 )
 
@@ -603,52 +604,64 @@ def write(many, slots_f, slots_i, slots_d, out):
 
 
 @kernel
-def march_chunk(
-    first, last, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits, corners,
+def march_some(
+    order, many, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits, corners,
     max_steps, max_tests, any_hit, slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d, out,
 ):  # fmt: skip
-    """March rays first..last-1; return exact tests."""
+    """March the rays order[:many]; return exact tests. order must have W more rows than are used."""
     status, resolved, pixel, prim_id_out, t, t_free, steps = out
     how = np.empty(W, np.int32)
     free = np.empty(W, np.float32)
     tests = 0
-    many = 0
-    for i in range(first, last, W):
-        live = simd.first(last - i)
-        index = simd.iota() + I(i)
+    filled = 0
+    for k in range(0, many, W):
         placed = set_up(
-            index, live, many, rays, size, box, slots_f, slots_i, slots_d, how, free
+            simd.load(order, k), simd.first(many - k), filled, rays, size, box,
+            slots_f, slots_i, slots_d, how, free,
         )  # fmt: skip
-        many += placed
-        if placed < min(W, last - i):
-            for k in range(min(W, last - i)):
-                if how[k] >= 0:
-                    status[i + k] = how[k]
-                    resolved[i + k] = how[k] == MISS
-                    pixel[i + k, 0], pixel[i + k, 1] = -1, -1
-                    prim_id_out[i + k] = -1
-                    t[i + k] = np.inf
-                    steps[i + k] = 0
-                    t_free[i + k] = free[k]
-        if many > BATCH - W or i + W >= last:
+        filled += placed
+        if placed < min(W, many - k):
+            for lane in range(min(W, many - k)):
+                if how[lane] >= 0:
+                    unmarched(order[k + lane], how[lane], free[lane], out)
+        if filled > BATCH - W or k + W >= many:
             tests += walk(
-                many, slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d, prim_id, nearest, rest, planes,
-                shape, cells, bits, corners, max_steps, max_tests, any_hit,
+                filled, slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d,
+                prim_id, nearest, rest, planes, shape, cells, bits, corners,
+                max_steps, max_tests, any_hit,
             )  # fmt: skip
-            write(many, slots_f, slots_i, slots_d, out)
-            many = 0
+            write(filled, slots_f, slots_i, slots_d, out)
+            filled = 0
     return tests
 
 
+@inlined
+def unmarched(i, how, free, out):
+    """Write the row of a ray that was not walked."""
+    status, resolved, pixel, prim_id, t, t_free, steps = out
+    status[i] = how
+    resolved[i] = how == MISS
+    pixel[i, 0], pixel[i, 1] = -1, -1
+    prim_id[i] = -1
+    t[i] = np.inf
+    steps[i] = 0
+    t_free[i] = free
+
+
 CHUNK = 1024
+GROUP = 16
 
 
 @parallel_kernel
 def march(
     workers, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits, corners,
-    max_steps, max_tests, any_hit, out, tests,
+    max_steps, max_tests, any_hit, probes, out, tests,
 ):  # fmt: skip
-    """March rays (N, 3); outputs (N,), tests (workers,)."""
+    """March rays (N, 3); outputs (N,), tests (workers,).
+
+    Of each GROUP of rays `probes` are marched first, and the others only if one of these was
+    resolved.
+    """
     count = len(rays[2])
     taken = np.zeros(1, np.int64)
     for worker in prange(workers):
@@ -658,11 +671,38 @@ def march(
         lanes_f = np.zeros(LANE_F32 * W, np.float32)
         lanes_i = np.zeros(LANE_I32 * W, np.int32)
         lanes_d = np.zeros(LANE_F64 * W, np.float64)
+        order = np.zeros(CHUNK + W, np.int32)
+        resolved = out[1]
+        apart = GROUP // probes
         first = fetch_add(taken.ctypes.data, CHUNK)
         while first < count:
-            tests[worker] += march_chunk(
-                first, min(count, first + CHUNK), rays, size, box, prim_id, nearest, rest, planes, shape,
-                cells, bits, corners, max_steps, max_tests, any_hit,
+            last = min(count, first + CHUNK)
+            many = 0
+            for i in range(first + apart // 2, last, apart):
+                order[many] = i
+                many += 1
+            tests[worker] += march_some(
+                order, many, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits,
+                corners, max_steps, max_tests, any_hit,
+                slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d, out,
+            )  # fmt: skip
+            many = 0
+            for group in range(first, last, GROUP):
+                end = min(group + GROUP, last)
+                hopeful = group + apart // 2 >= end
+                for i in range(group + apart // 2, end, apart):
+                    hopeful |= resolved[i]
+                for i in range(group, end):
+                    if (i - group) % apart == apart // 2:
+                        continue
+                    if hopeful:
+                        order[many] = i
+                        many += 1
+                    else:
+                        unmarched(i, SKIPPED, F(0.0), out)
+            tests[worker] += march_some(
+                order, many, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits,
+                corners, max_steps, max_tests, any_hit,
                 slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d, out,
             )  # fmt: skip
             first = fetch_add(taken.ctypes.data, CHUNK)

@@ -16,7 +16,8 @@ import numpy as np
 
 from hybrid_rt.kernels._jit import inlined
 
-HIT, MISS, OFFSCREEN, HIDDEN, NEAR, EXHAUSTED, INVALID, UNDECIDED = range(8)  # types.MarchStatus
+# types.MarchStatus
+HIT, MISS, OFFSCREEN, HIDDEN, NEAR, EXHAUSTED, INVALID, UNDECIDED, SKIPPED = range(9)
 
 CHUNK = 1024  # rays that a thread takes at a time
 
