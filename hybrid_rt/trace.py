@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import time
 from typing import Any
@@ -14,7 +15,7 @@ from hybrid_rt._embreex import EmbreexScene
 from hybrid_rt.embree import QUALITIES, WIDTHS, NativeScene, embree_info, packet_available
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels import trace as kernels
-from hybrid_rt.types import Bool, Hits, Rays, Scene
+from hybrid_rt.types import I32, Bool, Hits, Rays, Scene
 
 __all__ = ["BruteForceTracer", "EmbreeTracer", "embree_info", "packet_available"]
 
@@ -179,21 +180,80 @@ class EmbreeTracer:
         Hits
         """
         rays = _checked(rays)
-        if self._path == "run":
-            return self._bvh.embreex.intersect(rays, self.threads)
-        with _threads.limited(self.threads) as workers:
-            return self._bvh.native.intersect(
-                rays, width=self._width, coherent=self._coherent, workers=workers
-            )
+        hits = Hits.unfilled(len(rays))
+        self._intersect(rays, hits, None)
+        return hits
+
+    def intersect_into(
+        self, rays: Rays, hits: Hits, indices: Any = None, t_near: Any = None
+    ) -> None:
+        """Write the nearest hits of some rays into their rows of `hits`.
+
+        No ray is copied and no hit is moved, so that a caller who has the answers to the other rays
+        need neither compact nor merge. Without `indices` it is `intersect` into memory of the
+        caller's.
+
+        Parameters
+        ----------
+        rays : Rays
+            N rays.
+        hits : Hits
+            N rows, C-contiguous and writable; those of the rays at `indices` are written.
+        indices : (M,) array_like of int, optional
+            Which rays to trace, each from 0 to N - 1, in any order. Neighbours share a packet, so
+            rays that go alike should be neighbours. Default: all.
+        t_near : (N,) array_like of float32, optional
+            What stands in for ``rays.t_near``; only the values at `indices` are looked at.
+
+        Raises
+        ------
+        ArgumentError
+            Arrays of another shape or dtype, `hits` that cannot be written in place, an index that
+            no ray has.
+
+        Notes
+        -----
+        The rows written are those of ``intersect(rays.take(indices))``, bit for bit.
+        """
+        rays, places = _checked_some(rays, indices, t_near)
+        self._intersect(rays, _checked_hits(hits, len(rays)), places)
 
     def occluded(self, rays: Rays) -> Bool:
         """Return, as (N,) bool, whether each ray hits anything between its t_near and t_far."""
         rays = _checked(rays)
+        hit = np.empty(len(rays), np.bool_)
+        self._occluded(rays, hit, None)
+        return hit
+
+    def occluded_into(
+        self, rays: Rays, occluded: Bool, indices: Any = None, t_near: Any = None
+    ) -> None:
+        """Write whether some rays hit anything into their rows of `occluded`, (N,) bool.
+
+        All else is as in `intersect_into`.
+        """
+        rays, places = _checked_some(rays, indices, t_near)
+        _check.writable("occluded", occluded, (len(rays),), np.bool_)
+        self._occluded(rays, occluded, places)
+
+    def _intersect(self, rays: Rays, hits: Hits, indices: I32 | None) -> None:
         if self._path == "run":
-            return self._bvh.embreex.occluded(rays, self.threads)
+            rows = _rows(indices)
+            hits.put(rows, self._bvh.embreex.intersect(rays.take(rows), self.threads))
+            return
         with _threads.limited(self.threads) as workers:
-            return self._bvh.native.occluded(
-                rays, width=self._width, coherent=self._coherent, workers=workers
+            self._bvh.native.intersect(
+                rays, hits, indices, width=self._width, coherent=self._coherent, workers=workers
+            )
+
+    def _occluded(self, rays: Rays, hit: Bool, indices: I32 | None) -> None:
+        if self._path == "run":
+            rows = _rows(indices)
+            hit[rows] = self._bvh.embreex.occluded(rays.take(rows), self.threads)
+            return
+        with _threads.limited(self.threads) as workers:
+            self._bvh.native.occluded(
+                rays, hit, indices, width=self._width, coherent=self._coherent, workers=workers
             )
 
 
@@ -242,9 +302,26 @@ class BruteForceTracer:
             )  # fmt: skip
         return hits
 
+    def intersect_into(
+        self, rays: Rays, hits: Hits, indices: Any = None, t_near: Any = None
+    ) -> None:
+        """Write the nearest hits of some rays into their rows, as `EmbreeTracer.intersect_into`."""
+        rays, places = _checked_some(rays, indices, t_near)
+        rows = _rows(places)
+        _checked_hits(hits, len(rays)).put(rows, self.intersect(rays.take(rows)))
+
     def occluded(self, rays: Rays) -> Bool:
         """Return, as (N,) bool, whether each ray hits anything between its t_near and t_far."""
         return np.asarray(self.intersect(rays).prim_id >= 0)
+
+    def occluded_into(
+        self, rays: Rays, occluded: Bool, indices: Any = None, t_near: Any = None
+    ) -> None:
+        """Write whether some rays hit anything, as `EmbreeTracer.occluded_into`."""
+        rays, places = _checked_some(rays, indices, t_near)
+        _check.writable("occluded", occluded, (len(rays),), np.bool_)
+        rows = _rows(places)
+        occluded[rows] = self.occluded(rays.take(rows))
 
 
 class _Bvh:
@@ -287,6 +364,43 @@ def _checked(rays: Rays) -> Rays:
         _check.same_length(f"rays.{name}", value, "rays.origin", n)
         arrays.append(_kernel_array(value))
     return Rays(*arrays)
+
+
+def _checked_some(rays: Rays, indices: Any, t_near: Any) -> tuple[Rays, I32 | None]:
+    """Return rays with the t_near that is to be used, and indices that all are in range."""
+    rays = _checked(rays)
+    n = len(rays)
+    if t_near is not None:
+        near = _check.array("t_near", t_near, ("N",), np.float32)
+        _check.same_length("t_near", near, "rays", n)
+        rays = dataclasses.replace(rays, t_near=_kernel_array(near))
+    if indices is None:
+        return rays, None
+    places = _check.array("indices", indices, ("M",), np.int32)
+    if len(places):
+        low, high = int(places.min()), int(places.max())
+        if low < 0 or high >= n:
+            raise ArgumentError("indices", f"values from 0 to {n - 1}", f"values {low} to {high}")
+    return rays, _kernel_array(places)
+
+
+def _checked_hits(hits: Hits, n: int) -> Hits:
+    """Return `hits` if a kernel may write `n` rows there."""
+    _check.instance("hits", hits, Hits)
+    for name, shape, dtype in (
+        ("t", (n,), np.float32),
+        ("prim_id", (n,), np.int32),
+        ("u", (n,), np.float32),
+        ("v", (n,), np.float32),
+        ("n_g", (n, 3), np.float32),
+    ):
+        _check.writable(f"hits.{name}", getattr(hits, name), shape, dtype)
+    return hits
+
+
+def _rows(indices: I32 | None) -> Any:
+    """Return what selects the rows of `indices`, or all of them."""
+    return slice(None) if indices is None else indices
 
 
 def _kernel_array(value: NDArray[Any]) -> NDArray[Any]:

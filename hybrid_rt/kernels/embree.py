@@ -91,13 +91,14 @@ def _scale(d):
 
 
 @inlined
-def _load(first, width, origin, direction, t_near, t_far, packet, words, valid):
-    """Fill a packet from ray `first` on; return whether any of its lanes is valid."""
-    n = len(origin)
+def _load(
+    first, count, width, indexed, indices, origin, direction, t_near, t_far, packet, words, valid
+):
+    """Fill a packet from place `first` on; return whether any of its lanes is valid."""
     some = False
     for k in range(width):
-        i = first + k
-        if i < n and _usable(origin[i], direction[i], t_near[i], t_far[i]):
+        i = _ray(first + k, count, indexed, indices)
+        if i >= 0 and _usable(origin[i], direction[i], t_near[i], t_far[i]):
             some = True
             scale = _scale(direction[i])
             valid[k] = -1
@@ -121,10 +122,20 @@ def _load(first, width, origin, direction, t_near, t_far, packet, words, valid):
 
 
 @inlined
-def _store(first, width, packet, words, t, prim_id, u, v, n_g):
+def _ray(place, count, indexed, indices):
+    """Return which ray is at a place of the queue, -1 behind its end."""
+    if place >= count:
+        return np.int64(-1)
+    if indexed:
+        return np.int64(indices[place])
+    return np.int64(place)
+
+
+@inlined
+def _store(first, count, width, indexed, indices, packet, words, t, prim_id, u, v, n_g):
     """Write the hits of a packet; what Embree left in the fields of a miss is not looked at."""
-    for k in range(min(width, len(t) - first)):
-        i = first + k
+    for k in range(min(width, count - first)):
+        i = _ray(first + k, count, indexed, indices)
         if words[18 * width + k] == 0:  # the one geometry of the scene
             t[i] = packet[8 * width + k] * packet[SCALE * width + k]
             prim_id[i] = words[17 * width + k]
@@ -158,48 +169,61 @@ def _query(function, scene, arguments, width, packet, valid):
 
 @parallel_kernel
 def intersect(
-    function, scene, arguments, width, workers,
+    function, scene, arguments, width, workers, indexed, indices,
     origin, direction, t_near, t_far,
     t, prim_id, u, v, n_g,
 ):  # fmt: skip
-    """Nearest hits of (N, 3) rays by rtcIntersect1/4/8/16.
+    """Nearest hits of (N, 3) rays by rtcIntersect1/4/8/16, written to the rows of the rays.
 
     `function`, `scene` and `arguments` are addresses: the call for `width`, the RTCScene and the
-    RTCIntersectArguments. `workers` threads take chunks of rays from a common counter, since a
-    chunk of sky costs a fraction of a chunk of foliage; which thread traces a ray does not show.
+    RTCIntersectArguments. With `indexed` only the rays at `indices` (M,) int32 are traced, in that
+    order, and no other row is written. `workers` threads take chunks of rays from a common counter,
+    since a chunk of sky costs a fraction of a chunk of foliage; which thread traces a ray does not
+    show.
     """
+    count = len(indices) if indexed else len(origin)
     taken = np.zeros(1, np.int64)
     for _ in prange(workers):
         packet = _aligned(FIELDS * width)
         words = packet.view(np.int32)
         valid = _aligned(width).view(np.int32)
         start = fetch_add(taken.ctypes.data, CHUNK)
-        while start < len(origin):
-            for first in range(start, min(start + CHUNK, len(origin)), width):
-                if _load(first, width, origin, direction, t_near, t_far, packet, words, valid):
+        while start < count:
+            for first in range(start, min(start + CHUNK, count), width):
+                if _load(
+                    first, count, width, indexed, indices,
+                    origin, direction, t_near, t_far, packet, words, valid,
+                ):  # fmt: skip
                     _query(function, scene, arguments, width, packet, valid)
-                _store(first, width, packet, words, t, prim_id, u, v, n_g)
+                _store(first, count, width, indexed, indices, packet, words, t, prim_id, u, v, n_g)
             start = fetch_add(taken.ctypes.data, CHUNK)
 
 
 @parallel_kernel
 def occluded(
-    function, scene, arguments, width, workers, origin, direction, t_near, t_far, hit
+    function, scene, arguments, width, workers, indexed, indices,
+    origin, direction, t_near, t_far,
+    hit,
 ):  # fmt: skip
     """Whether (N, 3) rays hit anything, by rtcOccluded1/4/8/16; arguments as in `intersect`."""
+    count = len(indices) if indexed else len(origin)
     taken = np.zeros(1, np.int64)
     for _ in prange(workers):
         packet = _aligned(FIELDS * width)
         words = packet.view(np.int32)
         valid = _aligned(width).view(np.int32)
         start = fetch_add(taken.ctypes.data, CHUNK)
-        while start < len(origin):
-            for first in range(start, min(start + CHUNK, len(origin)), width):
-                if _load(first, width, origin, direction, t_near, t_far, packet, words, valid):
+        while start < count:
+            for first in range(start, min(start + CHUNK, count), width):
+                if _load(
+                    first, count, width, indexed, indices,
+                    origin, direction, t_near, t_far, packet, words, valid,
+                ):  # fmt: skip
                     _query(function, scene, arguments, width, packet, valid)
-                for k in range(min(width, len(origin) - first)):
+                for k in range(min(width, count - first)):
                     # Embree writes tfar = -inf for an occluded ray and leaves a masked lane alone.
-                    hit[first + k] = packet[8 * width + k] == -np.inf
+                    i = _ray(first + k, count, indexed, indices)
+                    hit[i] = packet[8 * width + k] == -np.inf
             start = fetch_add(taken.ctypes.data, CHUNK)
 
 
