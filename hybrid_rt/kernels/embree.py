@@ -24,6 +24,8 @@ from hybrid_rt.kernels._queue import fetch_add
 
 SCALE = 21
 FIELDS = 22
+LARGEST = np.float32(np.finfo(np.float32).max)
+SHORT, LONG = np.float32(2.0**-40), np.float32(2.0**40)  # of directions given as they are
 CHUNK = 512  # rays that a thread takes at a time; a multiple of every width
 
 
@@ -63,100 +65,111 @@ def _aligned(words):
 
 
 @inlined
-def _usable(o, d, near, far):
-    """Whether a ray may go to Embree: finite, with a direction, and not empty."""
-    finite = (
-        math.isfinite(o[0])
-        and math.isfinite(o[1])
-        and math.isfinite(o[2])
-        and math.isfinite(d[0])
-        and math.isfinite(d[1])
-        and math.isfinite(d[2])
+def _usable(ox, oy, oz, dx, dy, dz, near, far):
+    """Whether a ray may go to Embree: finite, with a direction, and not empty.
+
+    `&`, and not `and`, which would branch; no comparison holds for a NaN.
+    """
+    return (
+        (abs(ox) <= LARGEST)
+        & (abs(oy) <= LARGEST)
+        & (abs(oz) <= LARGEST)
+        & (abs(dx) <= LARGEST)
+        & (abs(dy) <= LARGEST)
+        & (abs(dz) <= LARGEST)
+        & ((dx != 0) | (dy != 0) | (dz != 0))
+        & (abs(near) <= LARGEST)
+        & (near <= far)
     )
-    aimed = d[0] != 0 or d[1] != 0 or d[2] != 0
-    return finite and aimed and math.isfinite(near) and near <= far
 
 
 @inlined
-def _scale(d):
+def _scale(dx, dy, dz):
     """Return a power of two that makes a direction one that Embree can follow: mostly 1.
 
     Embree inverts no component below 1e-18 and overflows with very long ones: without this, rays
     with directions shorter than 2**-55 miss what lies in front of them.
     """
-    largest = max(abs(d[0]), abs(d[1]), abs(d[2]))
-    if largest >= 2.0**-40 and largest <= 2.0**40:
+    largest = max(abs(dx), abs(dy), abs(dz))
+    if largest >= SHORT and largest <= LONG:
         return np.float32(1.0)
     return np.float32(math.ldexp(1.0, min(-math.frexp(largest)[1], 127)))
 
 
 @inlined
-def _load(
-    first, count, width, indexed, indices, origin, direction, t_near, t_far, packet, words, valid
-):
-    """Fill a packet from place `first` on; return whether any of its lanes is valid."""
-    some = False
+def _packet(width):
+    """Return a packet as float32 and as int32, and the flags of its lanes.
+
+    What no ray changes is set here once: time and id 0, all of the mask, nothing hit.
+    """
+    packet = _aligned(FIELDS * width)
+    words = packet.view(np.int32)
     for k in range(width):
-        i = _ray(first + k, count, indexed, indices)
-        if i >= 0 and _usable(origin[i], direction[i], t_near[i], t_far[i]):
-            some = True
-            scale = _scale(direction[i])
-            valid[k] = -1
-            packet[k] = origin[i, 0]
-            packet[width + k] = origin[i, 1]
-            packet[2 * width + k] = origin[i, 2]
-            packet[3 * width + k] = t_near[i] / scale
-            packet[4 * width + k] = direction[i, 0] * scale
-            packet[5 * width + k] = direction[i, 1] * scale
-            packet[6 * width + k] = direction[i, 2] * scale
-            packet[8 * width + k] = t_far[i] / scale
-            words[9 * width + k] = -1
-            packet[SCALE * width + k] = scale
-        else:
-            valid[k] = 0
-            for field in range(10):
-                packet[field * width + k] = 0.0
+        words[9 * width + k] = -1
         for field in range(17, SCALE):
             words[field * width + k] = -1
-    return some
+    return packet, words, _aligned(width).view(np.int32)
 
 
 @inlined
-def _ray(place, count, indexed, indices):
-    """Return which ray is at a place of the queue, -1 behind its end."""
-    if place >= count:
-        return np.int64(-1)
+def _ray(place, indexed, indices):
+    """Return which ray is at a place of the queue; unsigned, which spares the test for < 0."""
     if indexed:
-        return np.int64(indices[place])
-    return np.int64(place)
+        return np.uint64(indices[np.uint64(place)])
+    return np.uint64(place)
+
+
+@inlined
+def _load(
+    first, count, width, indexed, indices, origin, direction, t_near, t_far, packet, words, valid
+):  # fmt: skip
+    """Fill a packet from place `first` on; return whether any of its lanes is valid.
+
+    No row like ``origin[i]`` is formed, here or in any loop over rays: Numba counts references to
+    it, in atomic steps that took twice as long as all the rest.
+    """
+    some = False
+    for k in range(width):
+        i = _ray(min(first + k, count - 1), indexed, indices)
+        ox, oy, oz, near = origin[i, 0], origin[i, 1], origin[i, 2], t_near[i]
+        dx, dy, dz, far = direction[i, 0], direction[i, 1], direction[i, 2], t_far[i]
+        if _usable(ox, oy, oz, dx, dy, dz, near, far) and first + k < count:
+            some = True
+            scale = _scale(dx, dy, dz)
+            valid[k] = -1
+            packet[k] = ox
+            packet[width + k] = oy
+            packet[2 * width + k] = oz
+            packet[3 * width + k] = near / scale
+            packet[4 * width + k] = dx * scale
+            packet[5 * width + k] = dy * scale
+            packet[6 * width + k] = dz * scale
+            packet[8 * width + k] = far / scale
+            packet[SCALE * width + k] = scale
+        else:
+            valid[k] = 0
+            for field in range(9):
+                packet[field * width + k] = 0.0
+        words[18 * width + k] = -1
+    return some
 
 
 @inlined
 def _store(first, count, width, indexed, indices, packet, words, t, prim_id, u, v, n_g):
     """Write the hits of a packet; what Embree left in the fields of a miss is not looked at."""
-    for k in range(min(width, count - first)):
-        i = _ray(first + k, count, indexed, indices)
-        if words[18 * width + k] == 0:  # the one geometry of the scene
-            t[i] = packet[8 * width + k] * packet[SCALE * width + k]
-            prim_id[i] = words[17 * width + k]
-            n_g[i, 0] = packet[12 * width + k]
-            n_g[i, 1] = packet[13 * width + k]
-            n_g[i, 2] = packet[14 * width + k]
-            u[i] = packet[15 * width + k]
-            v[i] = packet[16 * width + k]
-        else:
-            _miss(i, t, prim_id, u, v, n_g)
-
-
-@inlined
-def _miss(i, t, prim_id, u, v, n_g):
-    t[i] = np.inf
-    prim_id[i] = -1
-    u[i] = 0.0
-    v[i] = 0.0
-    n_g[i, 0] = 0.0
-    n_g[i, 1] = 0.0
-    n_g[i, 2] = 0.0
+    nothing = np.float32(0.0)
+    for k in range(width):
+        if first + k >= count:
+            break
+        i = _ray(first + k, indexed, indices)
+        hit = words[18 * width + k] == 0  # the one geometry of the scene
+        t[i] = packet[8 * width + k] * packet[SCALE * width + k] if hit else np.float32(np.inf)
+        prim_id[i] = words[17 * width + k] if hit else np.int32(-1)
+        n_g[i, 0] = packet[12 * width + k] if hit else nothing
+        n_g[i, 1] = packet[13 * width + k] if hit else nothing
+        n_g[i, 2] = packet[14 * width + k] if hit else nothing
+        u[i] = packet[15 * width + k] if hit else nothing
+        v[i] = packet[16 * width + k] if hit else nothing
 
 
 @inlined
@@ -184,9 +197,7 @@ def intersect(
     count = len(indices) if indexed else len(origin)
     taken = np.zeros(1, np.int64)
     for _ in prange(workers):
-        packet = _aligned(FIELDS * width)
-        words = packet.view(np.int32)
-        valid = _aligned(width).view(np.int32)
+        packet, words, valid = _packet(width)
         start = fetch_add(taken.ctypes.data, CHUNK)
         while start < count:
             for first in range(start, min(start + CHUNK, count), width):
@@ -209,9 +220,7 @@ def occluded(
     count = len(indices) if indexed else len(origin)
     taken = np.zeros(1, np.int64)
     for _ in prange(workers):
-        packet = _aligned(FIELDS * width)
-        words = packet.view(np.int32)
-        valid = _aligned(width).view(np.int32)
+        packet, words, valid = _packet(width)
         start = fetch_add(taken.ctypes.data, CHUNK)
         while start < count:
             for first in range(start, min(start + CHUNK, count), width):
@@ -220,9 +229,11 @@ def occluded(
                     origin, direction, t_near, t_far, packet, words, valid,
                 ):  # fmt: skip
                     _query(function, scene, arguments, width, packet, valid)
-                for k in range(min(width, count - first)):
+                for k in range(width):
+                    if first + k >= count:
+                        break
                     # Embree writes tfar = -inf for an occluded ray and leaves a masked lane alone.
-                    i = _ray(first + k, count, indexed, indices)
+                    i = _ray(first + k, indexed, indices)
                     hit[i] = packet[8 * width + k] == -np.inf
             start = fetch_add(taken.ctypes.data, CHUNK)
 
@@ -231,5 +242,6 @@ def occluded(
 def usable(origin, direction, t_near, t_far, out, scale):
     """Set `out` (N,) bool where a ray may go to Embree, `scale` (N,) to its direction's factor."""
     for i in range(len(origin)):
-        out[i] = _usable(origin[i], direction[i], t_near[i], t_far[i])
-        scale[i] = _scale(direction[i]) if out[i] else np.float32(1.0)
+        dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
+        out[i] = _usable(origin[i, 0], origin[i, 1], origin[i, 2], dx, dy, dz, t_near[i], t_far[i])
+        scale[i] = _scale(dx, dy, dz) if out[i] else np.float32(1.0)
