@@ -163,6 +163,7 @@ class NativeScene:
         *,
         width: int,
         coherent: bool,
+        by_direction: bool,
         workers: int,
     ) -> None:
         """Write the nearest hits of the rays at `indices`, or of all, into their rows of `hits`.
@@ -172,7 +173,7 @@ class NativeScene:
         arguments = _query_arguments(coherent)
         kernels.intersect(
             _address(f"rtcIntersect{width}"), self._scene, arguments.ctypes.data, width, workers,
-            indices is not None, _NO_INDICES if indices is None else indices,
+            indices is not None, _NO_INDICES if indices is None else indices, by_direction,
             rays.origin, rays.direction, rays.t_near, rays.t_far,
             *hits.arrays,
         )  # fmt: skip
@@ -186,13 +187,14 @@ class NativeScene:
         *,
         width: int,
         coherent: bool,
+        by_direction: bool,
         workers: int,
     ) -> None:
         """Write whether rays hit anything; as `intersect`."""
         arguments = _query_arguments(coherent)
         kernels.occluded(
             _address(f"rtcOccluded{width}"), self._scene, arguments.ctypes.data, width, workers,
-            indices is not None, _NO_INDICES if indices is None else indices,
+            indices is not None, _NO_INDICES if indices is None else indices, by_direction,
             rays.origin, rays.direction, rays.t_near, rays.t_far,
             hit,
         )  # fmt: skip

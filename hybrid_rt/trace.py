@@ -20,6 +20,7 @@ from hybrid_rt.types import I32, Bool, Hits, Rays, Scene
 __all__ = ["BruteForceTracer", "EmbreeTracer", "embree_info", "packet_available"]
 
 PATHS = ("packet", "run")
+ORDERS = ("given", "direction")
 
 # Embree's float32 products of coordinates leave its range beyond about 2**-45 and 2**45, and it
 # answers with misses; see test_scenes_beyond_the_range_of_embree_are_refused.
@@ -43,7 +44,11 @@ class EmbreeTracer:
     robust : bool
         Embree's robust mode: edges shared by triangles let fewer rays through.
     coherent : bool
-        Tell Embree that neighbouring rays are alike, for path "packet".
+        Tell Embree that neighbouring rays are alike, for path "packet": it then takes a packet
+        through its BVH as a whole.
+    order : {"given", "direction"}
+        Which rays share a packet, for path "packet": neighbours, or, of every 2048 neighbours,
+        those that go the same way. The hits stay in the order of the rays.
     build_quality : {"high", "medium", "low"}
         Of Embree's BVH, for path "packet"; embreex always builds with "medium".
 
@@ -81,6 +86,7 @@ class EmbreeTracer:
         width: int = 8,
         robust: bool = True,
         coherent: bool = False,
+        order: str = "given",
         build_quality: str = "high",
     ) -> None:
         _check.instance("scene", scene, Scene)
@@ -94,7 +100,7 @@ class EmbreeTracer:
                 f"{largest:g}",
             )
         self._bvh = _Bvh(scene, _threads.count(threads), bool(robust), build_quality)
-        self._set_path(path, width, coherent, threads)
+        self._set_path(path, width, coherent, order, threads)
 
     def with_path(
         self,
@@ -102,6 +108,7 @@ class EmbreeTracer:
         *,
         width: int | None = None,
         coherent: bool | None = None,
+        order: str | None = None,
         threads: int | None = None,
     ) -> EmbreeTracer:
         """Return a tracer of the same scene that goes another way.
@@ -115,16 +122,20 @@ class EmbreeTracer:
             self.path if path is None else path,
             self.width if width is None else width,
             self.coherent if coherent is None else coherent,
+            self.order if order is None else order,
             self._threads if threads is None else threads,
         )
         return other
 
-    def _set_path(self, path: str, width: int, coherent: bool, threads: int | None) -> None:
+    def _set_path(
+        self, path: str, width: int, coherent: bool, order: str, threads: int | None
+    ) -> None:
         _threads.count(threads)
         self._threads = threads
         self._path = str(_check.choice("path", path, PATHS))
         self._width = int(_check.choice("width", width, WIDTHS))
         self._coherent = bool(_check.choice("coherent", coherent, (True, False)))
+        self._order = str(_check.choice("order", order, ORDERS))
         self._bvh.build(self._path)
 
     @property
@@ -141,6 +152,11 @@ class EmbreeTracer:
     def coherent(self) -> bool:
         """Whether Embree is told that neighbouring rays are alike."""
         return self._coherent
+
+    @property
+    def order(self) -> str:
+        """Which rays share a packet: "given" for neighbours, or "direction"."""
+        return self._order
 
     @property
     def robust(self) -> bool:
@@ -243,8 +259,9 @@ class EmbreeTracer:
             return
         with _threads.limited(self.threads) as workers:
             self._bvh.native.intersect(
-                rays, hits, indices, width=self._width, coherent=self._coherent, workers=workers
-            )
+                rays, hits, indices, width=self._width, coherent=self._coherent,
+                by_direction=self._order == "direction", workers=workers,
+            )  # fmt: skip
 
     def _occluded(self, rays: Rays, hit: Bool, indices: I32 | None) -> None:
         if self._path == "run":
@@ -253,8 +270,9 @@ class EmbreeTracer:
             return
         with _threads.limited(self.threads) as workers:
             self._bvh.native.occluded(
-                rays, hit, indices, width=self._width, coherent=self._coherent, workers=workers
-            )
+                rays, hit, indices, width=self._width, coherent=self._coherent,
+                by_direction=self._order == "direction", workers=workers,
+            )  # fmt: skip
 
 
 class BruteForceTracer:

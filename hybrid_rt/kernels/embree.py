@@ -26,7 +26,8 @@ SCALE = 21
 FIELDS = 22
 LARGEST = np.float32(np.finfo(np.float32).max)
 SHORT, LONG = np.float32(2.0**-40), np.float32(2.0**40)  # of directions given as they are
-CHUNK = 512  # rays that a thread takes at a time; a multiple of every width
+CELLS = 24  # of directions: octants times longest axis
+CHUNK = 2048  # rays that a thread takes at a time; a multiple of every width
 
 
 @intrinsic
@@ -112,25 +113,58 @@ def _packet(width):
 
 
 @inlined
-def _ray(place, indexed, indices):
-    """Return which ray is at a place of the queue; unsigned, which spares the test for < 0."""
-    if indexed:
-        return np.uint64(indices[np.uint64(place)])
-    return np.uint64(place)
+def _queue():
+    """Return room for the rays of a chunk, their keys, and the ends of the keys' runs."""
+    return np.empty(CHUNK, np.int64), np.empty(CHUNK, np.uint8), np.empty(CELLS + 1, np.int64)
+
+
+@inlined
+def _towards(x, y, z):
+    """Return a number from 0 to CELLS - 1 for a direction: its octant and its longest axis."""
+    octant = (1 if x < 0 else 0) + (2 if y < 0 else 0) + (4 if z < 0 else 0)
+    x, y, z = abs(x), abs(y), abs(z)
+    axis = 0 if (x >= y) & (x >= z) else (1 if y >= z else 2)
+    return np.uint64(8 * axis + octant)
+
+
+@inlined
+def _take(start, stop, indexed, indices, by_direction, direction, queue, keys, ends):
+    """Write the rays at places `start` to `stop` into `queue`, with `by_direction` sorted by it.
+
+    A stable counting sort: rays that go the same way stay in their order. The queue is short enough
+    to stay in the cache with its rays, so sorting costs no way through memory.
+    """
+    if not by_direction:
+        for place in range(start, stop):
+            queue[place - start] = indices[place] if indexed else place
+        return
+    for key in range(CELLS + 1):
+        ends[key] = 0
+    for place in range(start, stop):
+        i = np.uint64(indices[place]) if indexed else np.uint64(place)
+        key = _towards(direction[i, 0], direction[i, 1], direction[i, 2])
+        keys[place - start] = key
+        ends[key + np.uint64(1)] += 1
+    for key in range(CELLS):
+        ends[key + 1] += ends[key]
+    for place in range(start, stop):
+        key = keys[place - start]
+        queue[ends[key]] = indices[place] if indexed else place
+        ends[key] += 1
 
 
 @inlined
 def _load(
-    first, count, width, indexed, indices, origin, direction, t_near, t_far, packet, words, valid
+    first, count, width, queue, origin, direction, t_near, t_far, packet, words, valid
 ):  # fmt: skip
-    """Fill a packet from place `first` on; return whether any of its lanes is valid.
+    """Fill a packet from place `first` of the queue on; return whether any of its lanes is valid.
 
     No row like ``origin[i]`` is formed, here or in any loop over rays: Numba counts references to
     it, in atomic steps that took twice as long as all the rest.
     """
     some = False
     for k in range(width):
-        i = _ray(min(first + k, count - 1), indexed, indices)
+        i = np.uint64(queue[min(first + k, count - 1)])  # unsigned spares the test for < 0
         ox, oy, oz, near = origin[i, 0], origin[i, 1], origin[i, 2], t_near[i]
         dx, dy, dz, far = direction[i, 0], direction[i, 1], direction[i, 2], t_far[i]
         if _usable(ox, oy, oz, dx, dy, dz, near, far) and first + k < count:
@@ -155,13 +189,13 @@ def _load(
 
 
 @inlined
-def _store(first, count, width, indexed, indices, packet, words, t, prim_id, u, v, n_g):
+def _store(first, count, width, queue, packet, words, t, prim_id, u, v, n_g):
     """Write the hits of a packet; what Embree left in the fields of a miss is not looked at."""
     nothing = np.float32(0.0)
     for k in range(width):
         if first + k >= count:
             break
-        i = _ray(first + k, indexed, indices)
+        i = np.uint64(queue[first + k])
         hit = words[18 * width + k] == 0  # the one geometry of the scene
         t[i] = packet[8 * width + k] * packet[SCALE * width + k] if hit else np.float32(np.inf)
         prim_id[i] = words[17 * width + k] if hit else np.int32(-1)
@@ -182,7 +216,7 @@ def _query(function, scene, arguments, width, packet, valid):
 
 @parallel_kernel
 def intersect(
-    function, scene, arguments, width, workers, indexed, indices,
+    function, scene, arguments, width, workers, indexed, indices, by_direction,
     origin, direction, t_near, t_far,
     t, prim_id, u, v, n_g,
 ):  # fmt: skip
@@ -190,29 +224,34 @@ def intersect(
 
     `function`, `scene` and `arguments` are addresses: the call for `width`, the RTCScene and the
     RTCIntersectArguments. With `indexed` only the rays at `indices` (M,) int32 are traced, in that
-    order, and no other row is written. `workers` threads take chunks of rays from a common counter,
-    since a chunk of sky costs a fraction of a chunk of foliage; which thread traces a ray does not
-    show.
+    order, and no other row is written. With `by_direction` those of a chunk are traced sorted by
+    where they go. `workers` threads take chunks of rays from a common counter, since a chunk of sky
+    costs a fraction of a chunk of foliage; which thread traces a ray does not show.
     """
     count = len(indices) if indexed else len(origin)
     taken = np.zeros(1, np.int64)
     for _ in prange(workers):
         packet, words, valid = _packet(width)
+        queue, keys, ends = _queue()
         start = fetch_add(taken.ctypes.data, CHUNK)
         while start < count:
-            for first in range(start, min(start + CHUNK, count), width):
+            length = min(CHUNK, count - start)
+            _take(
+                start, start + length, indexed, indices, by_direction, direction, queue, keys, ends
+            )
+            for first in range(0, length, width):
                 if _load(
-                    first, count, width, indexed, indices,
+                    first, length, width, queue,
                     origin, direction, t_near, t_far, packet, words, valid,
                 ):  # fmt: skip
                     _query(function, scene, arguments, width, packet, valid)
-                _store(first, count, width, indexed, indices, packet, words, t, prim_id, u, v, n_g)
+                _store(first, length, width, queue, packet, words, t, prim_id, u, v, n_g)
             start = fetch_add(taken.ctypes.data, CHUNK)
 
 
 @parallel_kernel
 def occluded(
-    function, scene, arguments, width, workers, indexed, indices,
+    function, scene, arguments, width, workers, indexed, indices, by_direction,
     origin, direction, t_near, t_far,
     hit,
 ):  # fmt: skip
@@ -221,19 +260,24 @@ def occluded(
     taken = np.zeros(1, np.int64)
     for _ in prange(workers):
         packet, words, valid = _packet(width)
+        queue, keys, ends = _queue()
         start = fetch_add(taken.ctypes.data, CHUNK)
         while start < count:
-            for first in range(start, min(start + CHUNK, count), width):
+            length = min(CHUNK, count - start)
+            _take(
+                start, start + length, indexed, indices, by_direction, direction, queue, keys, ends
+            )
+            for first in range(0, length, width):
                 if _load(
-                    first, count, width, indexed, indices,
+                    first, length, width, queue,
                     origin, direction, t_near, t_far, packet, words, valid,
                 ):  # fmt: skip
                     _query(function, scene, arguments, width, packet, valid)
                 for k in range(width):
-                    if first + k >= count:
+                    if first + k >= length:
                         break
                     # Embree writes tfar = -inf for an occluded ray and leaves a masked lane alone.
-                    i = _ray(first + k, indexed, indices)
+                    i = np.uint64(queue[first + k])
                     hit[i] = packet[8 * width + k] == -np.inf
             start = fetch_add(taken.ctypes.data, CHUNK)
 

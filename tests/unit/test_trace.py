@@ -17,6 +17,13 @@ WAYS = {
     "packet-16": {"path": "packet", "width": 16},
     "packet-8-coherent": {"path": "packet", "width": 8, "coherent": True},
     "packet-16-coherent": {"path": "packet", "width": 16, "coherent": True},
+    "packet-8-by-direction": {"path": "packet", "width": 8, "order": "direction"},
+    "packet-16-by-direction": {
+        "path": "packet",
+        "width": 16,
+        "order": "direction",
+        "coherent": True,
+    },
     "run": {"path": "run"},
 }
 REASON = hrt.packet_available()
@@ -384,9 +391,10 @@ def test_zero_area_triangles_are_never_hit_and_keep_their_number():
 @needs_packets
 def test_ways_share_what_is_built(scene):
     tracer = hrt.EmbreeTracer(scene, threads=1)
-    wide = tracer.with_path(width=16, coherent=True)
+    wide = tracer.with_path(width=16, coherent=True, order="direction")
     assert (wide.path, wide.width, wide.coherent, wide.threads) == ("packet", 16, True, 1)
-    assert (tracer.width, tracer.coherent) == (8, False)
+    assert (wide.order, wide.with_path(width=4).order) == ("direction", "direction")
+    assert (tracer.width, tracer.coherent, tracer.order) == (8, False, "given")
     assert wide._bvh.native is tracer._bvh.native
     assert wide.build_seconds == tracer.build_seconds > 0
     run = tracer.with_path("run")
@@ -437,6 +445,7 @@ def test_threads_are_those_asked_for_and_numba_gets_its_own_back(scene):
         ({"threads": 1.5}, "threads"),
         ({"robust": "yes"}, "robust"),
         ({"coherent": None}, "coherent"),
+        ({"order": "random"}, "order"),
         ({"build_quality": "best"}, "build_quality"),
     ],
 )
