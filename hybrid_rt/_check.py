@@ -73,6 +73,26 @@ def array(
         return np.ascontiguousarray(arr, dtype=want)
 
 
+def writable(argument: str, value: Any, shape: tuple[int, ...], dtype: type[np.generic]) -> None:
+    """Raise unless `value` is an array that a kernel can fill in place: C-contiguous, writable."""
+    fits = (
+        isinstance(value, np.ndarray)
+        and value.shape == shape
+        and value.dtype == dtype
+        and value.flags.c_contiguous
+        and value.flags.writeable
+    )
+    if not fits:
+        expected = f"a writable, C-contiguous array of shape {_shape_text(shape)}"
+        got = describe(value)
+        if isinstance(value, np.ndarray):
+            if not value.flags.writeable:
+                got += ", read-only"
+            if not value.flags.c_contiguous:
+                got += ", strided"
+        raise ArgumentError(argument, f"{expected} and dtype {np.dtype(dtype)}", got)
+
+
 def same_length(argument: str, value: NDArray[Any], other: str, length: int) -> None:
     """Raise unless `value` has `length` rows, the length of the argument named `other`."""
     if len(value) != length:

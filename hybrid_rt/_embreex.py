@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import numpy as np
 
@@ -30,7 +29,7 @@ class EmbreexScene:
         valid, scale = usable(rays)
         if not valid.all():
             hits = Hits.empty(len(rays))
-            _put(hits, valid, self.intersect(rays.take(valid), threads))
+            hits.put(valid, self.intersect(rays.take(valid), threads))
             return hits
         if (scale != 1).any():
             hits = self.intersect(_scaled(rays, scale), threads)
@@ -40,7 +39,7 @@ class EmbreexScene:
         hits = self._from_zero(rays, threads)
         early = np.flatnonzero(hits.t < rays.t_near)
         if len(early):
-            _put(hits, early, self._displaced(rays.take(early), threads))
+            hits.put(early, self._displaced(rays.take(early), threads))
         return hits
 
     def occluded(self, rays: Rays, threads: int) -> Bool:
@@ -93,12 +92,6 @@ class EmbreexScene:
         hits = self.intersect(moved, threads)
         np.add(hits.t, rays.t_near, out=hits.t)
         return hits
-
-
-def _put(hits: Hits, where: Any, values: Hits) -> None:
-    """Write `values` into `hits` at an index or boolean array."""
-    for name in ("t", "prim_id", "u", "v", "n_g"):
-        getattr(hits, name)[where] = getattr(values, name)
 
 
 def _scaled(rays: Rays, scale: F32) -> Rays:

@@ -19,7 +19,7 @@ import numpy as np
 
 from hybrid_rt.errors import EmbreeError
 from hybrid_rt.kernels import embree as kernels
-from hybrid_rt.types import F32, Bool, Hits, Rays, Scene
+from hybrid_rt.types import F32, I32, Bool, Hits, Rays, Scene
 
 WIDTHS = (1, 4, 8, 16)
 QUALITIES = ("low", "medium", "high")  # in the order of RTCBuildQuality
@@ -40,6 +40,7 @@ _RTC_ERRORS = {
 }
 _PROPERTY_VERSION, _PROPERTY_TASKING = 0, 128
 _PROPERTY_NATIVE = {4: 32, 8: 33, 16: 34}
+_NO_INDICES = np.empty(0, np.int32)
 _TASKING = {0: "internal", 1: "TBB", 2: "PPL"}
 
 # Signature of every function used: result, then arguments.
@@ -154,28 +155,50 @@ class NativeScene:
         lib.rtcCommitScene(handle)
         self._check("rtcCommitScene")
 
-    def intersect(self, rays: Rays, *, width: int, coherent: bool, workers: int) -> Hits:
-        """Return the nearest hits; `workers` is the number of Numba threads in use."""
-        hits = Hits.unfilled(len(rays))
+    def intersect(
+        self,
+        rays: Rays,
+        hits: Hits,
+        indices: I32 | None,
+        *,
+        width: int,
+        coherent: bool,
+        by_direction: bool,
+        workers: int,
+    ) -> None:
+        """Write the nearest hits of the rays at `indices`, or of all, into their rows of `hits`.
+
+        `workers` is the number of Numba threads in use.
+        """
         arguments = _query_arguments(coherent)
         kernels.intersect(
             _address(f"rtcIntersect{width}"), self._scene, arguments.ctypes.data, width, workers,
+            indices is not None, _NO_INDICES if indices is None else indices, by_direction,
             rays.origin, rays.direction, rays.t_near, rays.t_far,
-            hits.t, hits.prim_id, hits.u, hits.v, hits.n_g,
+            *hits.arrays,
         )  # fmt: skip
         self._check(f"rtcIntersect{width}")
-        return hits
 
-    def occluded(self, rays: Rays, *, width: int, coherent: bool, workers: int) -> Bool:
-        """Return whether each ray hits anything."""
-        hit = np.empty(len(rays), np.bool_)
+    def occluded(
+        self,
+        rays: Rays,
+        hit: Bool,
+        indices: I32 | None,
+        *,
+        width: int,
+        coherent: bool,
+        by_direction: bool,
+        workers: int,
+    ) -> None:
+        """Write whether rays hit anything; as `intersect`."""
         arguments = _query_arguments(coherent)
         kernels.occluded(
             _address(f"rtcOccluded{width}"), self._scene, arguments.ctypes.data, width, workers,
-            rays.origin, rays.direction, rays.t_near, rays.t_far, hit,
+            indices is not None, _NO_INDICES if indices is None else indices, by_direction,
+            rays.origin, rays.direction, rays.t_near, rays.t_far,
+            hit,
         )  # fmt: skip
         self._check(f"rtcOccluded{width}")
-        return hit
 
     def _check(self, call: str) -> None:
         _check_device(_library(), self._device, call)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import time
 from typing import Any
@@ -14,11 +15,12 @@ from hybrid_rt._embreex import EmbreexScene
 from hybrid_rt.embree import QUALITIES, WIDTHS, NativeScene, embree_info, packet_available
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels import trace as kernels
-from hybrid_rt.types import Bool, Hits, Rays, Scene
+from hybrid_rt.types import I32, Bool, Hits, Rays, Scene
 
 __all__ = ["BruteForceTracer", "EmbreeTracer", "embree_info", "packet_available"]
 
 PATHS = ("packet", "run")
+ORDERS = ("given", "direction")
 
 # Embree's float32 products of coordinates leave its range beyond about 2**-45 and 2**45, and it
 # answers with misses; see test_scenes_beyond_the_range_of_embree_are_refused.
@@ -42,7 +44,11 @@ class EmbreeTracer:
     robust : bool
         Embree's robust mode: edges shared by triangles let fewer rays through.
     coherent : bool
-        Tell Embree that neighbouring rays are alike, for path "packet".
+        Tell Embree that neighbouring rays are alike, for path "packet": it then takes a packet
+        through its BVH as a whole.
+    order : {"given", "direction"}
+        Which rays share a packet, for path "packet": neighbours, or, of every 2048 neighbours,
+        those that go the same way. The hits stay in the order of the rays.
     build_quality : {"high", "medium", "low"}
         Of Embree's BVH, for path "packet"; embreex always builds with "medium".
 
@@ -80,6 +86,7 @@ class EmbreeTracer:
         width: int = 8,
         robust: bool = True,
         coherent: bool = False,
+        order: str = "given",
         build_quality: str = "high",
     ) -> None:
         _check.instance("scene", scene, Scene)
@@ -93,7 +100,7 @@ class EmbreeTracer:
                 f"{largest:g}",
             )
         self._bvh = _Bvh(scene, _threads.count(threads), bool(robust), build_quality)
-        self._set_path(path, width, coherent, threads)
+        self._set_path(path, width, coherent, order, threads)
 
     def with_path(
         self,
@@ -101,6 +108,7 @@ class EmbreeTracer:
         *,
         width: int | None = None,
         coherent: bool | None = None,
+        order: str | None = None,
         threads: int | None = None,
     ) -> EmbreeTracer:
         """Return a tracer of the same scene that goes another way.
@@ -114,16 +122,20 @@ class EmbreeTracer:
             self.path if path is None else path,
             self.width if width is None else width,
             self.coherent if coherent is None else coherent,
+            self.order if order is None else order,
             self._threads if threads is None else threads,
         )
         return other
 
-    def _set_path(self, path: str, width: int, coherent: bool, threads: int | None) -> None:
+    def _set_path(
+        self, path: str, width: int, coherent: bool, order: str, threads: int | None
+    ) -> None:
         _threads.count(threads)
         self._threads = threads
         self._path = str(_check.choice("path", path, PATHS))
         self._width = int(_check.choice("width", width, WIDTHS))
         self._coherent = bool(_check.choice("coherent", coherent, (True, False)))
+        self._order = str(_check.choice("order", order, ORDERS))
         self._bvh.build(self._path)
 
     @property
@@ -140,6 +152,11 @@ class EmbreeTracer:
     def coherent(self) -> bool:
         """Whether Embree is told that neighbouring rays are alike."""
         return self._coherent
+
+    @property
+    def order(self) -> str:
+        """Which rays share a packet: "given" for neighbours, or "direction"."""
+        return self._order
 
     @property
     def robust(self) -> bool:
@@ -179,22 +196,83 @@ class EmbreeTracer:
         Hits
         """
         rays = _checked(rays)
-        if self._path == "run":
-            return self._bvh.embreex.intersect(rays, self.threads)
-        with _threads.limited(self.threads) as workers:
-            return self._bvh.native.intersect(
-                rays, width=self._width, coherent=self._coherent, workers=workers
-            )
+        hits = Hits.unfilled(len(rays))
+        self._intersect(rays, hits, None)
+        return hits
+
+    def intersect_into(
+        self, rays: Rays, hits: Hits, indices: Any = None, t_near: Any = None
+    ) -> None:
+        """Write the nearest hits of some rays into their rows of `hits`.
+
+        No ray is copied and no hit is moved, so that a caller who has the answers to the other rays
+        need neither compact nor merge. Without `indices` it is `intersect` into memory of the
+        caller's.
+
+        Parameters
+        ----------
+        rays : Rays
+            N rays.
+        hits : Hits
+            N rows, C-contiguous and writable; those of the rays at `indices` are written.
+        indices : (M,) array_like of int, optional
+            Which rays to trace, each from 0 to N - 1, in any order. Neighbours share a packet, so
+            rays that go alike should be neighbours. Default: all.
+        t_near : (N,) array_like of float32, optional
+            What stands in for ``rays.t_near``; only the values at `indices` are looked at.
+
+        Raises
+        ------
+        ArgumentError
+            Arrays of another shape or dtype, `hits` that cannot be written in place, an index that
+            no ray has.
+
+        Notes
+        -----
+        The rows written are those of ``intersect(rays.take(indices))``, bit for bit.
+        """
+        rays, places = _checked_some(rays, indices, t_near)
+        self._intersect(rays, _checked_hits(hits, len(rays)), places)
 
     def occluded(self, rays: Rays) -> Bool:
         """Return, as (N,) bool, whether each ray hits anything between its t_near and t_far."""
         rays = _checked(rays)
+        hit = np.empty(len(rays), np.bool_)
+        self._occluded(rays, hit, None)
+        return hit
+
+    def occluded_into(
+        self, rays: Rays, occluded: Bool, indices: Any = None, t_near: Any = None
+    ) -> None:
+        """Write whether some rays hit anything into their rows of `occluded`, (N,) bool.
+
+        All else is as in `intersect_into`.
+        """
+        rays, places = _checked_some(rays, indices, t_near)
+        _check.writable("occluded", occluded, (len(rays),), np.bool_)
+        self._occluded(rays, occluded, places)
+
+    def _intersect(self, rays: Rays, hits: Hits, indices: I32 | None) -> None:
         if self._path == "run":
-            return self._bvh.embreex.occluded(rays, self.threads)
+            rows = _rows(indices)
+            hits.put(rows, self._bvh.embreex.intersect(rays.take(rows), self.threads))
+            return
         with _threads.limited(self.threads) as workers:
-            return self._bvh.native.occluded(
-                rays, width=self._width, coherent=self._coherent, workers=workers
-            )
+            self._bvh.native.intersect(
+                rays, hits, indices, width=self._width, coherent=self._coherent,
+                by_direction=self._order == "direction", workers=workers,
+            )  # fmt: skip
+
+    def _occluded(self, rays: Rays, hit: Bool, indices: I32 | None) -> None:
+        if self._path == "run":
+            rows = _rows(indices)
+            hit[rows] = self._bvh.embreex.occluded(rays.take(rows), self.threads)
+            return
+        with _threads.limited(self.threads) as workers:
+            self._bvh.native.occluded(
+                rays, hit, indices, width=self._width, coherent=self._coherent,
+                by_direction=self._order == "direction", workers=workers,
+            )  # fmt: skip
 
 
 class BruteForceTracer:
@@ -242,9 +320,26 @@ class BruteForceTracer:
             )  # fmt: skip
         return hits
 
+    def intersect_into(
+        self, rays: Rays, hits: Hits, indices: Any = None, t_near: Any = None
+    ) -> None:
+        """Write the nearest hits of some rays into their rows, as `EmbreeTracer.intersect_into`."""
+        rays, places = _checked_some(rays, indices, t_near)
+        rows = _rows(places)
+        _checked_hits(hits, len(rays)).put(rows, self.intersect(rays.take(rows)))
+
     def occluded(self, rays: Rays) -> Bool:
         """Return, as (N,) bool, whether each ray hits anything between its t_near and t_far."""
         return np.asarray(self.intersect(rays).prim_id >= 0)
+
+    def occluded_into(
+        self, rays: Rays, occluded: Bool, indices: Any = None, t_near: Any = None
+    ) -> None:
+        """Write whether some rays hit anything, as `EmbreeTracer.occluded_into`."""
+        rays, places = _checked_some(rays, indices, t_near)
+        _check.writable("occluded", occluded, (len(rays),), np.bool_)
+        rows = _rows(places)
+        occluded[rows] = self.occluded(rays.take(rows))
 
 
 class _Bvh:
@@ -287,6 +382,43 @@ def _checked(rays: Rays) -> Rays:
         _check.same_length(f"rays.{name}", value, "rays.origin", n)
         arrays.append(_kernel_array(value))
     return Rays(*arrays)
+
+
+def _checked_some(rays: Rays, indices: Any, t_near: Any) -> tuple[Rays, I32 | None]:
+    """Return rays with the t_near that is to be used, and indices that all are in range."""
+    rays = _checked(rays)
+    n = len(rays)
+    if t_near is not None:
+        near = _check.array("t_near", t_near, ("N",), np.float32)
+        _check.same_length("t_near", near, "rays", n)
+        rays = dataclasses.replace(rays, t_near=_kernel_array(near))
+    if indices is None:
+        return rays, None
+    places = _check.array("indices", indices, ("M",), np.int32)
+    if len(places):
+        low, high = int(places.min()), int(places.max())
+        if low < 0 or high >= n:
+            raise ArgumentError("indices", f"values from 0 to {n - 1}", f"values {low} to {high}")
+    return rays, _kernel_array(places)
+
+
+def _checked_hits(hits: Hits, n: int) -> Hits:
+    """Return `hits` if a kernel may write `n` rows there."""
+    _check.instance("hits", hits, Hits)
+    for name, shape, dtype in (
+        ("t", (n,), np.float32),
+        ("prim_id", (n,), np.int32),
+        ("u", (n,), np.float32),
+        ("v", (n,), np.float32),
+        ("n_g", (n, 3), np.float32),
+    ):
+        _check.writable(f"hits.{name}", getattr(hits, name), shape, dtype)
+    return hits
+
+
+def _rows(indices: I32 | None) -> Any:
+    """Return what selects the rows of `indices`, or all of them."""
+    return slice(None) if indices is None else indices
 
 
 def _kernel_array(value: NDArray[Any]) -> NDArray[Any]:

@@ -504,7 +504,7 @@ class Rays:
         """All arrays, in the order of the attributes, as kernels take them."""
         return self.origin, self.direction, self.pixel, self.t_near, self.t_far
 
-    def take(self, index: NDArray[Any]) -> Rays:
+    def take(self, index: Any) -> Rays:
         """Return the rays selected by an index or boolean array."""
         return Rays(
             self.origin[index],
@@ -563,6 +563,11 @@ class Hits:
     def arrays(self) -> tuple[F32, I32, F32, F32, F32]:
         """All arrays, in the order of the attributes, as kernels take them."""
         return self.t, self.prim_id, self.u, self.v, self.n_g
+
+    def put(self, index: Any, values: Hits) -> None:
+        """Write `values` into the rows selected by an index or boolean array."""
+        for mine, theirs in zip(self.arrays, values.arrays, strict=True):
+            mine[index] = theirs
 
     def __len__(self) -> int:
         return len(self.t)

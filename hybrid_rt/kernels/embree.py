@@ -24,7 +24,10 @@ from hybrid_rt.kernels._queue import fetch_add
 
 SCALE = 21
 FIELDS = 22
-CHUNK = 512  # rays that a thread takes at a time; a multiple of every width
+LARGEST = np.float32(np.finfo(np.float32).max)
+SHORT, LONG = np.float32(2.0**-40), np.float32(2.0**40)  # of directions given as they are
+CELLS = 24  # of directions: octants times longest axis
+CHUNK = 2048  # rays that a thread takes at a time; a multiple of every width
 
 
 @intrinsic
@@ -63,89 +66,144 @@ def _aligned(words):
 
 
 @inlined
-def _usable(o, d, near, far):
-    """Whether a ray may go to Embree: finite, with a direction, and not empty."""
-    finite = (
-        math.isfinite(o[0])
-        and math.isfinite(o[1])
-        and math.isfinite(o[2])
-        and math.isfinite(d[0])
-        and math.isfinite(d[1])
-        and math.isfinite(d[2])
+def _usable(ox, oy, oz, dx, dy, dz, near, far):
+    """Whether a ray may go to Embree: finite, with a direction, and not empty.
+
+    `&`, and not `and`, which would branch; no comparison holds for a NaN.
+    """
+    return (
+        (abs(ox) <= LARGEST)
+        & (abs(oy) <= LARGEST)
+        & (abs(oz) <= LARGEST)
+        & (abs(dx) <= LARGEST)
+        & (abs(dy) <= LARGEST)
+        & (abs(dz) <= LARGEST)
+        & ((dx != 0) | (dy != 0) | (dz != 0))
+        & (abs(near) <= LARGEST)
+        & (near <= far)
     )
-    aimed = d[0] != 0 or d[1] != 0 or d[2] != 0
-    return finite and aimed and math.isfinite(near) and near <= far
 
 
 @inlined
-def _scale(d):
+def _scale(dx, dy, dz):
     """Return a power of two that makes a direction one that Embree can follow: mostly 1.
 
     Embree inverts no component below 1e-18 and overflows with very long ones: without this, rays
     with directions shorter than 2**-55 miss what lies in front of them.
     """
-    largest = max(abs(d[0]), abs(d[1]), abs(d[2]))
-    if largest >= 2.0**-40 and largest <= 2.0**40:
+    largest = max(abs(dx), abs(dy), abs(dz))
+    if largest >= SHORT and largest <= LONG:
         return np.float32(1.0)
     return np.float32(math.ldexp(1.0, min(-math.frexp(largest)[1], 127)))
 
 
 @inlined
-def _load(first, width, origin, direction, t_near, t_far, packet, words, valid):
-    """Fill a packet from ray `first` on; return whether any of its lanes is valid."""
-    n = len(origin)
+def _packet(width):
+    """Return a packet as float32 and as int32, and the flags of its lanes.
+
+    What no ray changes is set here once: time and id 0, all of the mask, nothing hit.
+    """
+    packet = _aligned(FIELDS * width)
+    words = packet.view(np.int32)
+    for k in range(width):
+        words[9 * width + k] = -1
+        for field in range(17, SCALE):
+            words[field * width + k] = -1
+    return packet, words, _aligned(width).view(np.int32)
+
+
+@inlined
+def _queue():
+    """Return room for the rays of a chunk, their keys, and the ends of the keys' runs."""
+    return np.empty(CHUNK, np.int64), np.empty(CHUNK, np.uint8), np.empty(CELLS + 1, np.int64)
+
+
+@inlined
+def _towards(x, y, z):
+    """Return a number from 0 to CELLS - 1 for a direction: its octant and its longest axis."""
+    octant = (1 if x < 0 else 0) + (2 if y < 0 else 0) + (4 if z < 0 else 0)
+    x, y, z = abs(x), abs(y), abs(z)
+    axis = 0 if (x >= y) & (x >= z) else (1 if y >= z else 2)
+    return np.uint64(8 * axis + octant)
+
+
+@inlined
+def _take(start, stop, indexed, indices, by_direction, direction, queue, keys, ends):
+    """Write the rays at places `start` to `stop` into `queue`, with `by_direction` sorted by it.
+
+    A stable counting sort: rays that go the same way stay in their order. The queue is short enough
+    to stay in the cache with its rays, so sorting costs no way through memory.
+    """
+    if not by_direction:
+        for place in range(start, stop):
+            queue[place - start] = indices[place] if indexed else place
+        return
+    for key in range(CELLS + 1):
+        ends[key] = 0
+    for place in range(start, stop):
+        i = np.uint64(indices[place]) if indexed else np.uint64(place)
+        key = _towards(direction[i, 0], direction[i, 1], direction[i, 2])
+        keys[place - start] = key
+        ends[key + np.uint64(1)] += 1
+    for key in range(CELLS):
+        ends[key + 1] += ends[key]
+    for place in range(start, stop):
+        key = keys[place - start]
+        queue[ends[key]] = indices[place] if indexed else place
+        ends[key] += 1
+
+
+@inlined
+def _load(
+    first, count, width, queue, origin, direction, t_near, t_far, packet, words, valid
+):  # fmt: skip
+    """Fill a packet from place `first` of the queue on; return whether any of its lanes is valid.
+
+    No row like ``origin[i]`` is formed, here or in any loop over rays: Numba counts references to
+    it, in atomic steps that took twice as long as all the rest.
+    """
     some = False
     for k in range(width):
-        i = first + k
-        if i < n and _usable(origin[i], direction[i], t_near[i], t_far[i]):
+        i = np.uint64(queue[min(first + k, count - 1)])  # unsigned spares the test for < 0
+        ox, oy, oz, near = origin[i, 0], origin[i, 1], origin[i, 2], t_near[i]
+        dx, dy, dz, far = direction[i, 0], direction[i, 1], direction[i, 2], t_far[i]
+        if _usable(ox, oy, oz, dx, dy, dz, near, far) and first + k < count:
             some = True
-            scale = _scale(direction[i])
+            scale = _scale(dx, dy, dz)
             valid[k] = -1
-            packet[k] = origin[i, 0]
-            packet[width + k] = origin[i, 1]
-            packet[2 * width + k] = origin[i, 2]
-            packet[3 * width + k] = t_near[i] / scale
-            packet[4 * width + k] = direction[i, 0] * scale
-            packet[5 * width + k] = direction[i, 1] * scale
-            packet[6 * width + k] = direction[i, 2] * scale
-            packet[8 * width + k] = t_far[i] / scale
-            words[9 * width + k] = -1
+            packet[k] = ox
+            packet[width + k] = oy
+            packet[2 * width + k] = oz
+            packet[3 * width + k] = near / scale
+            packet[4 * width + k] = dx * scale
+            packet[5 * width + k] = dy * scale
+            packet[6 * width + k] = dz * scale
+            packet[8 * width + k] = far / scale
             packet[SCALE * width + k] = scale
         else:
             valid[k] = 0
-            for field in range(10):
+            for field in range(9):
                 packet[field * width + k] = 0.0
-        for field in range(17, SCALE):
-            words[field * width + k] = -1
+        words[18 * width + k] = -1
     return some
 
 
 @inlined
-def _store(first, width, packet, words, t, prim_id, u, v, n_g):
+def _store(first, count, width, queue, packet, words, t, prim_id, u, v, n_g):
     """Write the hits of a packet; what Embree left in the fields of a miss is not looked at."""
-    for k in range(min(width, len(t) - first)):
-        i = first + k
-        if words[18 * width + k] == 0:  # the one geometry of the scene
-            t[i] = packet[8 * width + k] * packet[SCALE * width + k]
-            prim_id[i] = words[17 * width + k]
-            n_g[i, 0] = packet[12 * width + k]
-            n_g[i, 1] = packet[13 * width + k]
-            n_g[i, 2] = packet[14 * width + k]
-            u[i] = packet[15 * width + k]
-            v[i] = packet[16 * width + k]
-        else:
-            _miss(i, t, prim_id, u, v, n_g)
-
-
-@inlined
-def _miss(i, t, prim_id, u, v, n_g):
-    t[i] = np.inf
-    prim_id[i] = -1
-    u[i] = 0.0
-    v[i] = 0.0
-    n_g[i, 0] = 0.0
-    n_g[i, 1] = 0.0
-    n_g[i, 2] = 0.0
+    nothing = np.float32(0.0)
+    for k in range(width):
+        if first + k >= count:
+            break
+        i = np.uint64(queue[first + k])
+        hit = words[18 * width + k] == 0  # the one geometry of the scene
+        t[i] = packet[8 * width + k] * packet[SCALE * width + k] if hit else np.float32(np.inf)
+        prim_id[i] = words[17 * width + k] if hit else np.int32(-1)
+        n_g[i, 0] = packet[12 * width + k] if hit else nothing
+        n_g[i, 1] = packet[13 * width + k] if hit else nothing
+        n_g[i, 2] = packet[14 * width + k] if hit else nothing
+        u[i] = packet[15 * width + k] if hit else nothing
+        v[i] = packet[16 * width + k] if hit else nothing
 
 
 @inlined
@@ -158,48 +216,69 @@ def _query(function, scene, arguments, width, packet, valid):
 
 @parallel_kernel
 def intersect(
-    function, scene, arguments, width, workers,
+    function, scene, arguments, width, workers, indexed, indices, by_direction,
     origin, direction, t_near, t_far,
     t, prim_id, u, v, n_g,
 ):  # fmt: skip
-    """Nearest hits of (N, 3) rays by rtcIntersect1/4/8/16.
+    """Nearest hits of (N, 3) rays by rtcIntersect1/4/8/16, written to the rows of the rays.
 
     `function`, `scene` and `arguments` are addresses: the call for `width`, the RTCScene and the
-    RTCIntersectArguments. `workers` threads take chunks of rays from a common counter, since a
-    chunk of sky costs a fraction of a chunk of foliage; which thread traces a ray does not show.
+    RTCIntersectArguments. With `indexed` only the rays at `indices` (M,) int32 are traced, in that
+    order, and no other row is written. With `by_direction` those of a chunk are traced sorted by
+    where they go. `workers` threads take chunks of rays from a common counter, since a chunk of sky
+    costs a fraction of a chunk of foliage; which thread traces a ray does not show.
     """
+    count = len(indices) if indexed else len(origin)
     taken = np.zeros(1, np.int64)
     for _ in prange(workers):
-        packet = _aligned(FIELDS * width)
-        words = packet.view(np.int32)
-        valid = _aligned(width).view(np.int32)
+        packet, words, valid = _packet(width)
+        queue, keys, ends = _queue()
         start = fetch_add(taken.ctypes.data, CHUNK)
-        while start < len(origin):
-            for first in range(start, min(start + CHUNK, len(origin)), width):
-                if _load(first, width, origin, direction, t_near, t_far, packet, words, valid):
+        while start < count:
+            length = min(CHUNK, count - start)
+            _take(
+                start, start + length, indexed, indices, by_direction, direction, queue, keys, ends
+            )
+            for first in range(0, length, width):
+                if _load(
+                    first, length, width, queue,
+                    origin, direction, t_near, t_far, packet, words, valid,
+                ):  # fmt: skip
                     _query(function, scene, arguments, width, packet, valid)
-                _store(first, width, packet, words, t, prim_id, u, v, n_g)
+                _store(first, length, width, queue, packet, words, t, prim_id, u, v, n_g)
             start = fetch_add(taken.ctypes.data, CHUNK)
 
 
 @parallel_kernel
 def occluded(
-    function, scene, arguments, width, workers, origin, direction, t_near, t_far, hit
+    function, scene, arguments, width, workers, indexed, indices, by_direction,
+    origin, direction, t_near, t_far,
+    hit,
 ):  # fmt: skip
     """Whether (N, 3) rays hit anything, by rtcOccluded1/4/8/16; arguments as in `intersect`."""
+    count = len(indices) if indexed else len(origin)
     taken = np.zeros(1, np.int64)
     for _ in prange(workers):
-        packet = _aligned(FIELDS * width)
-        words = packet.view(np.int32)
-        valid = _aligned(width).view(np.int32)
+        packet, words, valid = _packet(width)
+        queue, keys, ends = _queue()
         start = fetch_add(taken.ctypes.data, CHUNK)
-        while start < len(origin):
-            for first in range(start, min(start + CHUNK, len(origin)), width):
-                if _load(first, width, origin, direction, t_near, t_far, packet, words, valid):
+        while start < count:
+            length = min(CHUNK, count - start)
+            _take(
+                start, start + length, indexed, indices, by_direction, direction, queue, keys, ends
+            )
+            for first in range(0, length, width):
+                if _load(
+                    first, length, width, queue,
+                    origin, direction, t_near, t_far, packet, words, valid,
+                ):  # fmt: skip
                     _query(function, scene, arguments, width, packet, valid)
-                for k in range(min(width, len(origin) - first)):
+                for k in range(width):
+                    if first + k >= length:
+                        break
                     # Embree writes tfar = -inf for an occluded ray and leaves a masked lane alone.
-                    hit[first + k] = packet[8 * width + k] == -np.inf
+                    i = np.uint64(queue[first + k])
+                    hit[i] = packet[8 * width + k] == -np.inf
             start = fetch_add(taken.ctypes.data, CHUNK)
 
 
@@ -207,5 +286,6 @@ def occluded(
 def usable(origin, direction, t_near, t_far, out, scale):
     """Set `out` (N,) bool where a ray may go to Embree, `scale` (N,) to its direction's factor."""
     for i in range(len(origin)):
-        out[i] = _usable(origin[i], direction[i], t_near[i], t_far[i])
-        scale[i] = _scale(direction[i]) if out[i] else np.float32(1.0)
+        dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
+        out[i] = _usable(origin[i, 0], origin[i, 1], origin[i, 2], dx, dy, dz, t_near[i], t_far[i])
+        scale[i] = _scale(dx, dy, dz) if out[i] else np.float32(1.0)

@@ -19,6 +19,9 @@ REASON = hrt.packet_available()
 WAYS = [{"path": "run"}]
 if REASON is None:
     WAYS += [{"path": "packet", "width": w, "coherent": c} for w in (1, 4, 8, 16) for c in (0, 1)]
+    WAYS += [
+        {"path": "packet", "width": w, "coherent": True, "order": "direction"} for w in (8, 16)
+    ]
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,6 @@
 """All ways to trace give the same answers, within their limits, and refuse what they cannot do."""
 
+import dataclasses
 import gc
 
 import numba
@@ -16,6 +17,13 @@ WAYS = {
     "packet-16": {"path": "packet", "width": 16},
     "packet-8-coherent": {"path": "packet", "width": 8, "coherent": True},
     "packet-16-coherent": {"path": "packet", "width": 16, "coherent": True},
+    "packet-8-by-direction": {"path": "packet", "width": 8, "order": "direction"},
+    "packet-16-by-direction": {
+        "path": "packet",
+        "width": 16,
+        "order": "direction",
+        "coherent": True,
+    },
     "run": {"path": "run"},
 }
 REASON = hrt.packet_available()
@@ -230,6 +238,111 @@ def test_permuted_rays_give_permuted_hits(way):
     assert_same_bits(hrt.Hits(*(getattr(hits, name)[order] for name in FIELDS)), permuted)
 
 
+def marked(n):
+    """Hits that no tracer writes, to see which rows it leaves alone."""
+    hits = hrt.Hits.unfilled(n)
+    for array in hits.arrays:
+        array[...] = 77
+    return hits
+
+
+def rows(hits, index):
+    return hrt.Hits(*(getattr(hits, name)[index] for name in FIELDS))
+
+
+@pytest.mark.parametrize("m", [0, 1, 5, 333, 2051])
+def test_rays_by_index_get_the_bits_of_the_rays_taken(way, truth, m):
+    rays = random_rays(31, 3000)
+    indices = np.random.default_rng(m).permutation(3000)[:m].astype(np.int32)
+    rest = np.setdiff1d(np.arange(3000), indices)
+    for tracer in (way, truth):
+        hits, occluded = marked(3000), np.full(3000, 2, np.uint8).view(np.bool_)
+        tracer.intersect_into(rays, hits, indices)
+        tracer.occluded_into(rays, occluded, indices)
+        expected = tracer.intersect(rays.take(indices))
+        assert_same_bits(rows(hits, indices), expected)
+        assert_same_bits(rows(hits, rest), marked(len(rest)))
+        assert (occluded[indices] == tracer.occluded(rays.take(indices))).all()
+        assert (occluded.view(np.uint8)[rest] == 2).all()
+
+
+def test_without_indices_every_row_is_written(way, truth):
+    rays = random_rays(32, 777)
+    for tracer in (way, truth):
+        hits, occluded = marked(777), np.full(777, 2, np.uint8).view(np.bool_)
+        tracer.intersect_into(rays, hits)
+        tracer.occluded_into(rays, occluded)
+        assert_same_bits(hits, tracer.intersect(rays))
+        assert (occluded == tracer.occluded(rays)).all()
+
+
+def test_t_near_of_the_call_stands_in_for_that_of_the_rays(way, truth):
+    """As a march hands rays over: only at the indices, and the rays themselves keep theirs."""
+    rays = random_rays(33, 1000)
+    first = truth.intersect(rays)
+    t_near = np.where(first.prim_id >= 0, first.t * 1.001, 0.5).astype(np.float32)
+    indices = np.arange(0, 1000, 3)
+    t_near[np.arange(1000) % 3 != 0] = np.nan  # not looked at
+    moved = limited(rays.take(indices), t_near=t_near[indices])
+    for tracer in (way, truth):
+        hits, occluded = marked(1000), np.empty(1000, np.bool_)
+        tracer.intersect_into(rays, hits, indices, t_near)
+        tracer.occluded_into(rays, occluded, indices, t_near)
+        assert_same_bits(rows(hits, indices), tracer.intersect(moved))
+        assert (hits.prim_id[indices] != first.prim_id[indices]).any()
+        assert (occluded[indices] == tracer.occluded(moved)).all()
+    assert not rays.t_near.any()
+
+
+def test_a_row_of_an_invalid_ray_becomes_a_miss(way, truth):
+    rays = random_rays(34, 40)
+    rays.direction[7] = np.nan
+    for tracer in (way, truth):
+        hits = marked(40)
+        tracer.intersect_into(rays, hits, np.array([3, 7]))
+        assert_same_bits(rows(hits, [7]), hrt.Hits.empty(1))
+
+
+@pytest.mark.parametrize(
+    ("argument", "change"),
+    [
+        ("indices", {"indices": np.array([0, 10])}),
+        ("indices", {"indices": np.array([-1])}),
+        ("indices", {"indices": np.array([0.5])}),
+        ("indices", {"indices": np.array([[0, 1]])}),
+        ("t_near", {"t_near": np.zeros(9, np.float32)}),
+        ("hits", {"hits": None}),
+        ("hits.t", {"hits": hrt.Hits.empty(9)}),
+        ("hits.u", {"hits": dataclasses.replace(hrt.Hits.empty(10), u=np.zeros(10))}),
+        ("hits.v", {"hits": dataclasses.replace(hrt.Hits.empty(10), v=np.zeros(20, "f4")[::2])}),
+        ("hits.prim_id", {"hits": dataclasses.replace(hrt.Hits.empty(10), prim_id=[0] * 10)}),
+        (
+            "hits.n_g",
+            {
+                "hits": dataclasses.replace(
+                    hrt.Hits.empty(10), n_g=np.broadcast_to(np.float32(0), (10, 3))
+                )
+            },
+        ),
+    ],
+)
+def test_places_that_cannot_be_read_or_written_are_refused(way, truth, argument, change):
+    for tracer in (way, truth):
+        hits = hrt.Hits.empty(10)
+        with pytest.raises(hrt.ArgumentError) as error:
+            tracer.intersect_into(random_rays(35, 10), **({"hits": hits} | change))
+        assert error.value.argument == argument
+        assert_same_bits(hits, hrt.Hits.empty(10))
+
+
+def test_flags_that_cannot_be_written_are_refused(way, truth):
+    rays = random_rays(36, 10)
+    for tracer in (way, truth):
+        for flags in (np.zeros(9, np.bool_), np.zeros(10, np.int8), np.zeros(20, np.bool_)[::2]):
+            with pytest.raises(hrt.ArgumentError, match="occluded: expected a writable"):
+                tracer.occluded_into(rays, flags)
+
+
 def test_inputs_are_never_written(way, truth):
     rays = random_rays(13, 100, t_near=np.full(100, 0.1), t_far=np.full(100, 3.0))
     before = rays.take(np.arange(100))
@@ -278,9 +391,10 @@ def test_zero_area_triangles_are_never_hit_and_keep_their_number():
 @needs_packets
 def test_ways_share_what_is_built(scene):
     tracer = hrt.EmbreeTracer(scene, threads=1)
-    wide = tracer.with_path(width=16, coherent=True)
+    wide = tracer.with_path(width=16, coherent=True, order="direction")
     assert (wide.path, wide.width, wide.coherent, wide.threads) == ("packet", 16, True, 1)
-    assert (tracer.width, tracer.coherent) == (8, False)
+    assert (wide.order, wide.with_path(width=4).order) == ("direction", "direction")
+    assert (tracer.width, tracer.coherent, tracer.order) == (8, False, "given")
     assert wide._bvh.native is tracer._bvh.native
     assert wide.build_seconds == tracer.build_seconds > 0
     run = tracer.with_path("run")
@@ -331,6 +445,7 @@ def test_threads_are_those_asked_for_and_numba_gets_its_own_back(scene):
         ({"threads": 1.5}, "threads"),
         ({"robust": "yes"}, "robust"),
         ({"coherent": None}, "coherent"),
+        ({"order": "random"}, "order"),
         ({"build_quality": "best"}, "build_quality"),
     ],
 )
