@@ -155,6 +155,19 @@ class RunWriter:
             self.meta["cells"].append({**cell, "state": "measured"})
             self.flush()
 
+    def renew_cell(
+        self, cell: dict[str, Any], samples: list[dict[str, Any]], results: list[dict[str, Any]]
+    ) -> None:
+        """Keep a cell of which more has been measured, in place of what was kept of it before."""
+
+        def others(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+            return [row for row in rows if any(row[key] != cell[key] for key in self.keys)]
+
+        with _uninterrupted():
+            self._samples, self._results = others(self._samples), others(self._results)
+            self.meta["cells"] = others(self.meta["cells"])
+            self.add_cell(cell, samples, results, [])
+
     def fail_cell(self, cell: dict[str, Any], error: str) -> None:
         """Keep that a cell failed, and why."""
         with _uninterrupted():
