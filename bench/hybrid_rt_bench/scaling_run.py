@@ -53,14 +53,88 @@ class PlannedSeries:
 
 
 @dataclass
+class Measured:
+    """What is known and measured of a cell so far.
+
+    Attributes
+    ----------
+    series : Series
+    planned : PlannedCell
+    details : dict
+        See `hybrid_rt_bench.scaling_cell.Cell`.
+    samples : list of dict
+    alpha, steps : dict of float
+    peak : int
+        Most bytes of memory in any visit, 0 where the system does not say.
+    """
+
+    series: Series
+    planned: PlannedCell
+    details: dict[str, Any]
+    samples: list[dict[str, Any]] = field(default_factory=list)
+    alpha: dict[str, float] = field(default_factory=dict)
+    steps: dict[str, float] = field(default_factory=dict)
+    peak: int = 0
+
+    def add(self, visit: Visit) -> None:
+        """Take in what a visit found."""
+        self.samples += visit.rows
+        self.alpha, self.steps = visit.alpha, visit.steps
+        self.peak = max(self.peak, visit.peak or 0)
+
+    def seconds(self) -> dict[Key, Any]:
+        """Return the seconds of each measured round by technique and stage, sums too."""
+        found: dict[Key, list[float]] = {}
+        for row in self.samples:
+            if row["phase"] == "measured":
+                found.setdefault((row["technique"], row["stage"]), []).append(row["seconds"])
+        arrays = {key: np.array(values) for key, values in found.items()}
+        return with_sums(arrays, self.details["screens"])
+
+    def record(self) -> tuple[dict[str, Any], list[dict[str, Any]], list[dict[str, Any]]]:
+        """Return the cell, its samples and its results, for `RunWriter.renew_cell`."""
+        task, details = self.planned.task, self.details
+        place = {
+            "scene": task.scene, "camera": task.camera, "width": task.width, "height": task.height,
+            "triangles": details["triangles"], "threads": task.threads,
+            "label": self.planned.label, "axis": self.series.axis, "rays": details["rays"],
+        }  # fmt: skip
+        memory = {
+            "peak_bytes": self.peak,
+            "program_bytes": details["program_bytes"],
+            "scene_bytes": details["scene_bytes"],
+        }
+        seconds = self.seconds()
+        sampled = min(task.brute_rays, details["rays"])
+        rows = [
+            {
+                **place,
+                **row,
+                **memory,
+                "alpha": self.alpha.get(row["technique"], float("nan")),
+                "steps_per_ray": self.steps.get(row["technique"], float("nan")),
+                "embree_path": details["embree_path"],
+            }
+            for row in rows_of(seconds, {"brute_force": sampled}, details["rays"])
+        ]
+        cell = {
+            **_keys(self.series, self.planned),
+            **place,
+            **details,
+            **memory,
+            "alpha": self.alpha,
+            "steps_per_ray": self.steps,
+            "unstable": unstable(seconds),
+        }
+        return cell, self.samples, rows
+
+
+@dataclass
 class _Live:
     """A cell whose process is alive."""
 
-    planned: PlannedCell
+    measured: Measured
     worker: Worker
-    details: dict[str, Any]
-    samples: list[dict[str, Any]] = field(default_factory=list)
-    peaks: list[int] = field(default_factory=list)
     took: float = 0.0
 
 
@@ -237,7 +311,7 @@ class _Run:
             except BaseException:
                 worker.stop()
                 raise
-            live.append(_Live(cell, worker, details))
+            live.append(_Live(Measured(planned.series, cell, details), worker))
             self.reporter.advance()
             if not self.reporter.console.is_terminal:
                 self.reporter.say(
@@ -251,7 +325,7 @@ class _Run:
             # Up and down in turn, so that a machine that grows slower does not tilt the line.
             for cell in list(live) if number % 2 == 0 else list(reversed(live)):
                 self.reporter.doing(
-                    f"{series.name}, {cell.planned.label}: round {number + 1} of {rounds}"
+                    f"{series.name}, {cell.measured.planned.label}: round {number + 1} of {rounds}"
                 )
                 start = time.monotonic()
                 try:
@@ -259,11 +333,14 @@ class _Run:
                 except WorkerError as error:
                     cell.worker.stop()
                     live.remove(cell)
-                    self._fail(series, cell.planned, f"in round {number + 1} of {rounds}: {error}")
+                    self._fail(
+                        series, cell.measured.planned, f"in round {number + 1} of {rounds}: {error}"
+                    )
                     self.reporter.advance(rounds - number)
                     continue
                 cell.took = time.monotonic() - start
-                self._keep(series, cell, visit)
+                cell.measured.add(visit)
+                self.writer.renew_cell(*cell.measured.record())
                 self.reporter.advance()
             if live and not self.reporter.console.is_terminal:
                 left = sum(cell.took for cell in live) * (rounds - number - 1)
@@ -273,48 +350,8 @@ class _Run:
                 )
         for cell in live:
             if not self.reporter.console.is_terminal:
-                self.reporter.say(f"{series.name}, {cell.planned.label}: {_said(cell)}")
-
-    def _keep(self, series: Series, cell: _Live, visit: Visit) -> None:
-        """Put a cell with all that is measured of it so far into the run."""
-        cell.samples += visit.rows
-        if visit.peak is not None:
-            cell.peaks.append(visit.peak)
-        task, details = cell.planned.task, cell.details
-        place = {
-            "scene": task.scene, "camera": task.camera, "width": task.width, "height": task.height,
-            "triangles": details["triangles"], "threads": task.threads, "label": cell.planned.label,
-            "axis": series.axis, "rays": details["rays"],
-        }  # fmt: skip
-        memory = {
-            "peak_bytes": max(cell.peaks, default=0),
-            "program_bytes": details["program_bytes"],
-            "scene_bytes": details["scene_bytes"],
-        }
-        seconds = with_sums(_seconds(cell.samples), details["screens"])
-        sampled = min(task.brute_rays, details["rays"])
-        rows = [
-            {
-                **place, **row, **memory,
-                "alpha": visit.alpha.get(row["technique"], float("nan")),
-                "steps_per_ray": visit.steps.get(row["technique"], float("nan")),
-                "embree_path": details["embree_path"],
-            }
-            for row in rows_of(seconds, {"brute_force": sampled}, details["rays"])
-        ]  # fmt: skip
-        self.writer.renew_cell(
-            {
-                **_keys(series, cell.planned),
-                **place,
-                **details,
-                **memory,
-                "alpha": visit.alpha,
-                "steps_per_ray": visit.steps,
-                "unstable": unstable(seconds),
-            },
-            cell.samples,
-            rows,
-        )
+                label = cell.measured.planned.label
+                self.reporter.say(f"{series.name}, {label}: {_said(cell.measured)}")
 
     def _fail(self, series: Series, cell: PlannedCell, reason: str) -> None:
         self.reporter.say(f"failed: {series.name}, {cell.label}: {reason}", "bold red")
@@ -336,17 +373,9 @@ class _Run:
         )
 
 
-def _seconds(samples: list[dict[str, Any]]) -> dict[Key, Any]:
-    found: dict[Key, list[float]] = {}
-    for row in samples:
-        if row["phase"] == "measured":
-            found.setdefault((row["technique"], row["stage"]), []).append(row["seconds"])
-    return {key: np.array(values) for key, values in found.items()}
-
-
-def _said(cell: _Live) -> str:
+def _said(cell: Measured) -> str:
     """Return what is said of a finished cell on a console without a bar."""
-    seconds = with_sums(_seconds(cell.samples), cell.details["screens"])
+    seconds = cell.seconds()
 
     def ms(technique: str, stage: str) -> str:
         return f"{1e3 * float(np.median(seconds[technique, stage])):.3g} ms"
@@ -356,8 +385,8 @@ def _said(cell: _Live) -> str:
         f"{name} march {ms(name, 'march')}, hybrid {ms(name, 'hybrid')}"
         for name in cell.planned.task.techniques
     ]
-    if cell.peaks:
-        parts.append(f"peak {max(cell.peaks) / 2**20:.0f} MiB")
+    if cell.peak:
+        parts.append(f"peak {cell.peak / 2**20:.0f} MiB")
     return "; ".join(parts)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
 from hybrid_rt_bench.report.figures import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, STYLE
@@ -51,6 +52,9 @@ GUIDES: dict[str, tuple[Guide, ...]] = {
 """Slopes to compare with, for each axis."""
 
 LONG_LABEL, MOST_LABELS = 7, 9
+
+LABEL_SHARE = 0.05
+"""The height of a guide's name as a share of the height of a panel."""
 
 
 @dataclass(frozen=True)
@@ -143,6 +147,9 @@ def memory(run: RunData) -> Figure | None:
 
 def _grid(figure: Figure, count: int, most: int) -> list[tuple[Axes, Axes]]:
     """Return panels side by side, each with a place beneath for a legend of up to `most` lines."""
+    engine = figure.get_layout_engine()
+    assert isinstance(engine, ConstrainedLayoutEngine)
+    engine.set(w_pad=0.14)  # room beside the names of guides
     grid = figure.add_gridspec(2, count, height_ratios=(1.0, 0.02 + 0.055 * -(-most // 2)))
     return [(figure.add_subplot(grid[0, k]), figure.add_subplot(grid[1, k])) for k in range(count)]
 
@@ -221,23 +228,29 @@ def _guides(
     n = np.geomspace(xs.min(), xs.max(), 200)
     falling = axis == "threads"
     start = top / 1.25 if falling else low / 1.35
+    ends: dict[str, float] = {}
     for name, shape in GUIDES[axis]:
         y = start * shape(n) / shape(n[0])
         ax.plot(n, y, color="#9A9A9A", lw=1.0, ls=(0, (1, 2)), zorder=1)
         inside = (y <= top) & (y >= bottom)
         last = int(np.flatnonzero(inside)[-1])
         if last == len(n) - 1:
-            ax.annotate(
-                name, (n[last], y[last]), xytext=(9, 0), textcoords="offset points", va="center",
-                fontsize=8, color=GREY, annotation_clip=False,
-            )  # fmt: skip
-        else:
-            below = y[last] < math.sqrt(top * bottom)
-            ax.annotate(
-                name, (n[last], bottom if below else top), xytext=(0, -3 if below else 3),
-                textcoords="offset points", ha="center", va="top" if below else "bottom",
-                fontsize=8, color=GREY, annotation_clip=False,
-            )  # fmt: skip
+            ends[name] = float(y[last])
+            continue
+        below = y[last] < math.sqrt(top * bottom)
+        ax.annotate(
+            name, (n[last], bottom if below else top), xytext=(0, -3 if below else 3),
+            textcoords="offset points", ha="center", va="top" if below else "bottom",
+            fontsize=8, color=GREY, annotation_clip=False,
+        )  # fmt: skip
+    above = 0.0
+    for name, y in sorted(ends.items(), key=lambda end: end[1]):
+        y = max(y, above)  # names that would lie on one another are moved apart
+        above = y * (top / bottom) ** LABEL_SHARE
+        ax.annotate(
+            name, (n[-1], y), xytext=(9, 0), textcoords="offset points", va="center", fontsize=8,
+            color=GREY, annotation_clip=False,
+        )  # fmt: skip
 
 
 def _ticks(ax: Axes, axis: str, xs: np.ndarray[Any, Any], labels: list[str]) -> None:
