@@ -69,6 +69,9 @@ CELL_KEYS = ("scene", "camera", "width", "height")
 """What tells the cells of a run apart, unless its kind has keys of its own."""
 
 
+Rows = list[dict[str, Any]]
+
+
 class ReportsError(HybridRTError):
     """The folder of a run cannot be made, written or read."""
 
@@ -158,15 +161,23 @@ class RunWriter:
     def renew_cell(
         self, cell: dict[str, Any], samples: list[dict[str, Any]], results: list[dict[str, Any]]
     ) -> None:
-        """Keep a cell of which more has been measured, in place of what was kept of it before."""
+        """Keep a cell of which more has been measured, in place of what was kept of it before.
 
-        def others(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-            return [row for row in rows if any(row[key] != cell[key] for key in self.keys)]
+        Rows stay where the cell's first ones were.
+        """
 
+        def renewed(kept: Rows, new: Rows) -> Rows:
+            mine = [all(row[key] == cell[key] for key in self.keys) for row in kept]
+            at = mine.index(True) if True in mine else len(kept)
+            others = [row for row, old in zip(kept, mine, strict=True) if not old]
+            return others[:at] + new + others[at:]
+
+        keys = {key: cell[key] for key in self.keys}
         with _uninterrupted():
-            self._samples, self._results = others(self._samples), others(self._results)
-            self.meta["cells"] = others(self.meta["cells"])
-            self.add_cell(cell, samples, results, [])
+            self._samples = renewed(self._samples, [{**keys, **row} for row in samples])
+            self._results = renewed(self._results, [{**keys, **row} for row in results])
+            self.meta["cells"] = renewed(self.meta["cells"], [{**cell, "state": "measured"}])
+            self.flush()
 
     def fail_cell(self, cell: dict[str, Any], error: str) -> None:
         """Keep that a cell failed, and why."""

@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
-from typing import Any, Literal
+from typing import Any
 
 import numba
 
@@ -115,6 +115,9 @@ class Stages:
             "robust": tracer.robust,
             "coherent": tracer.coherent,
         }
+        # In every cell the same build is timed, also where embreex's own path, which copies the
+        # scene through Python, is the strongest.
+        self.built = {**self.options, "path": _native_path()}
         self.modes = {name: get_technique(name).mode for name in task.techniques}
         self.screens = {name: _screen(mode) for name, mode in self.modes.items()}
         self.needed = {stage for stages in self.screens.values() for stage in stages}
@@ -143,8 +146,12 @@ class Stages:
             return made
 
         if self.task.build:
-            self.tracer = None  # never two of them in memory
-            self.tracer = timed("build", self.build)
+            replaced = self.options["path"] == self.built["path"]
+            if replaced:
+                self.tracer = None  # never two of them in memory
+            built = timed("build", lambda: self.make_tracer(self.built))
+            self.tracer = built if replaced else self.tracer
+            del built
         tracer = self.tracer
         assert tracer is not None
         plain = timed("raster", lambda: hrt.rasterize(self.scene, self.camera, threads=threads))
@@ -187,9 +194,9 @@ class Stages:
             timed("brute_force", lambda: self.brute.intersect(few))
         return seconds
 
-    def build(self) -> hrt.EmbreeTracer:
-        """Return a tracer like the strongest, newly built."""
-        return hrt.EmbreeTracer(self.scene, threads=self.task.threads, **self.options)
+    def make_tracer(self, options: dict[str, Any]) -> hrt.EmbreeTracer:
+        """Return a tracer, newly built."""
+        return hrt.EmbreeTracer(self.scene, threads=self.task.threads, **options)
 
 
 class Cell:
@@ -317,9 +324,8 @@ def _strongest(
     rays = hrt.mirror_rays(hrt.rasterize(scene, camera, threads=task.threads))
     if len(rays) == 0:
         raise CellError("the camera sees no surface, so there are no mirror rays")
-    path: Literal["packet", "run"] = "packet" if hrt.packet_available() is None else "run"
     robust, default = (
-        hrt.EmbreeTracer(scene, threads=task.threads, path=path, robust=mode)
+        hrt.EmbreeTracer(scene, threads=task.threads, path=_native_path(), robust=mode)
         for mode in (True, False)
     )
     choice = strongest.choose(strongest.candidates(robust, default), rays, task.selection_rays)
@@ -330,6 +336,10 @@ def _strongest(
     )  # fmt: skip
     found = {"embree_path": choice.best.label, "embree_ns_per_ray": choice.nanoseconds}
     return alone, rays, found
+
+
+def _native_path() -> str:
+    return "packet" if hrt.packet_available() is None else "run"
 
 
 def _screen(mode: hrt.Mode) -> tuple[str, str]:

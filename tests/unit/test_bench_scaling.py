@@ -15,7 +15,7 @@ import hybrid_rt as hrt
 from hybrid_rt_bench import compare, exponents, memory, results, scaling_stages, strongest
 from hybrid_rt_bench.plan import NothingToRunError
 from hybrid_rt_bench.report import render_run, scaling, scaling_figures
-from hybrid_rt_bench.scaling_cell import Cell, Task, Visit
+from hybrid_rt_bench.scaling_cell import Cell, Stages, Task, Visit
 from hybrid_rt_bench.scaling_run import Measured, PlannedCell, _thread_counts, plan_series
 from hybrid_rt_bench.scaling_worker import Worker, WorkerError
 from hybrid_rt_bench.spec import Resolution, load_experiment, parse_experiment
@@ -293,6 +293,27 @@ def test_a_stage_that_no_technique_reads_is_not_run():
     cell = Cell(dataclasses.replace(TINY, techniques=("slope",), build=False))
     stages = {row["stage"] for row in cell.visit(0, 0).rows if row["technique"] == ""}
     assert stages == {"raster", "pyramid", "pyramid_slope", "rays", "embree"}
+
+
+@pytest.mark.skipif(hrt.packet_available() is not None, reason="Embree's packets are not reached")
+@pytest.mark.parametrize(("path", "renewed"), [("packet", True), ("run", False)])
+def test_the_same_build_is_timed_whichever_path_is_the_strongest(monkeypatch, path, renewed):
+    made = []
+    cell = Cell(TINY)
+    stages = cell.stages
+    strongest_one = hrt.EmbreeTracer(stages.scene, path=path, width=4)
+    stages = Stages(stages.scene, stages.camera, strongest_one, TINY)
+    make = stages.make_tracer
+
+    def watched(options):
+        made.append(make(options))
+        return made[-1]
+
+    monkeypatch.setattr(stages, "make_tracer", watched)
+    assert ("", "build") in stages.run(trace_first=True)
+    assert [tracer.path for tracer in made] == ["packet"]
+    assert (stages.tracer is made[0]) is renewed
+    assert (stages.tracer.path, stages.tracer.width) == (path, 4)
 
 
 def test_brute_force_is_left_out_where_it_takes_too_long():

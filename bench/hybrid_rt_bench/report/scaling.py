@@ -91,7 +91,7 @@ def growth(run: RunData, name: str) -> Table:
                 number(rows.ms[first]),
                 number(rows.ms[last]),
                 interval(ratio.value, ratio.low, ratio.high),
-                number(rows.ns_per_ray[last] / rows.ns_per_ray[first]),
+                number(ratio.value * rows.rays[first] / rows.rays[last]),
                 goal,
             ]
         )
