@@ -10,8 +10,10 @@ caches, threads and freed memory as a measured pass needs them.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import gc
 import signal
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -30,6 +32,8 @@ from hybrid_rt_bench.techniques import get_technique
 
 TRIED_RAYS = 64
 """On how many rays it is tried how long brute force would take."""
+
+_PR_SET_PDEATHSIG = 1  # prctl(2)
 
 
 @dataclass(frozen=True)
@@ -305,6 +309,7 @@ def serve(connection: Connection, task: Task) -> None:
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started this one
     memory.first_to_go()
+    _end_with_parent()
     with contextlib.suppress(EOFError, BrokenPipeError):
         try:
             cell = Cell(task)
@@ -315,6 +320,16 @@ def serve(connection: Connection, task: Task) -> None:
             raise
         except Exception as error:  # the cell is lost, and says why
             connection.send(("failed", reason_of(error)))
+
+
+def _end_with_parent() -> None:
+    """Have the system end this process when the one that started it ends, however that comes.
+
+    Linux; elsewhere it ends after the visit that it is at.
+    """
+    if sys.platform.startswith("linux"):
+        with contextlib.suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _strongest(

@@ -1,9 +1,13 @@
 """``hybrid-rt run scaling``, a very small one, from the command line to its report."""
 
 import json
+import os
+import subprocess
 import sys
+from pathlib import Path
 
 import pandas as pd
+import psutil
 import pytest
 
 from hybrid_rt_bench import cli, scaling_run
@@ -180,6 +184,33 @@ def test_ctrl_c_keeps_what_is_measured_and_ends_the_processes(
     folder = next(path.parent for path in tmp_path.glob("*/run.json"))
     assert json.loads((folder / "run.json").read_text())["interrupted"]
     assert set(pd.read_parquet(folder / "results.parquet").rounds) == {1}
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="prctl is Linux's")
+def test_no_process_outlives_a_run_that_is_killed(tmp_path, experiment):
+    root = Path(__file__).parents[2]
+    paths = os.pathsep.join(map(str, (root, root / "bench", root / "scenes")))
+    experiment.write_text(TINY.replace("rounds = 2", "rounds = 100000"))
+    started = subprocess.Popen(
+        [sys.executable, "-m", "hybrid_rt_bench", "run", str(experiment), "--series", "cores",
+         "--threads", "1", "--out", str(tmp_path)],
+        env=os.environ | {"PYTHONPATH": paths}, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        for line in started.stderr:
+            if "round 1 of" in line:
+                break
+        parent = psutil.Process(started.pid)
+        cells = [child for child in parent.children() if "spawn_main" in " ".join(child.cmdline())]
+        assert cells
+    finally:
+        started.kill()
+        started.wait()
+        started.stderr.close()
+    _, alive = psutil.wait_procs(cells, timeout=20)
+    assert not alive
+    results = pd.read_parquet(next(tmp_path.glob("*/results.parquet")))
+    assert results.rounds.min() >= 1
 
 
 def test_a_run_of_which_nothing_was_measured_is_a_failure(
