@@ -493,6 +493,14 @@ def test_the_goal_of_the_march_is_judged_from_2_14_to_2_23(tmp_path, monkeypatch
     assert row[-1] == said
 
 
+def test_a_goal_held_by_too_few_rounds_is_not_called_sure(tmp_path):
+    for rounds, shown in ((1, "1.37 [–]"), (3, "1.37 [1.37, 1.37]")):
+        table = table_of(write_run(tmp_path, rounds=rounds), "Growth")
+        row = row_of(table, "march (certified)")
+        assert row[2] == shown
+        assert row[-1] == "held, by its median alone"
+
+
 def test_a_run_that_ends_early_says_so_of_the_goal(tmp_path):
     table = table_of(write_run(tmp_path, sizes=(2**10, 2**14, 2**18)), "Growth from 2^14 to 2^18")
     assert row_of(table, "march (certified)")[-1] == "not said: 2^14 to 2^23 not measured"
