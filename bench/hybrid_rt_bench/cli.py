@@ -82,6 +82,14 @@ def run(
     cases: Annotated[
         str | None, typer.Option("--cases", help="Hard cases by name, for `run stability`.")
     ] = None,
+    series: Annotated[
+        str | None,
+        typer.Option("--series", help="Series by name or axis, for `run scaling`: triangles"),
+    ] = None,
+    triangles: Annotated[
+        str | None,
+        typer.Option("--triangles", help="Sizes, for `run scaling`: 4096,2^14 or 2^10..2^18"),
+    ] = None,
     threads: Threads = None,
     out_dir: OutDir = Path("reports"),
     as_json: Annotated[
@@ -108,12 +116,17 @@ def run(
     * `hybrid-rt run paper --scenes hall.glb --json > hall.json` - a mesh file of your own
 
     * `hybrid-rt run stability` - the hard set: which technique answers wrongly on which case
+
+    * `hybrid-rt run scaling --series triangles --triangles 2^10..2^20` - growth over one axis
     """
     from hybrid_rt_bench.kinds import RUNNERS
     from hybrid_rt_bench.progress import Reporter
 
     spec = load_experiment(experiment, quick=quick)
-    picks = {"scenes": scenes, "cameras": cameras, "cases": cases}
+    picks = {
+        "scenes": scenes, "cameras": cameras, "cases": cases, "series": series,
+        "triangles": triangles,
+    }  # fmt: skip
     given = {**picks, "resolutions": resolutions, "rounds": rounds}
     _check_options(spec, [name for name, value in given.items() if value is not None])
     spec = _overridden(spec, resolutions, rounds)
@@ -188,7 +201,7 @@ def compare(
     from hybrid_rt_bench import compare as comparing
 
     a, b = load_run(first, out_dir), load_run(second, out_dir)
-    for table in comparing.tables(comparing.compare(a, b), a, b):
+    for table in comparing.compared(a, b):
         _show(table)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from hybrid_rt.errors import ArgumentError
-from hybrid_rt_bench import stats
+from hybrid_rt_bench import compare_scaling, stats
 from hybrid_rt_bench.report.table import Table, interval, number
 from hybrid_rt_bench.results import HYBRID_STAGES, STAGES, RunData
 
@@ -47,12 +47,16 @@ def compare(a: RunData, b: RunData) -> Comparison:
     """
     for run in (a, b):
         if run.kind != "paper":
-            raise ArgumentError("runs", "two of kind 'paper'", f"{run.name}, of kind {run.kind!r}")
+            raise ArgumentError(
+                "runs",
+                "two of kind 'paper', or two of kind 'scaling'",
+                f"{run.name}, of kind {run.kind!r}",
+            )
     both = a.results.merge(b.results, on=KEYS, suffixes=("_a", "_b"))
     if both.empty:
         raise ArgumentError("runs", f"a cell that {a.name} and {b.name} share", "none in common")
     times_a, times_b = _times(a), _times(b)
-    stages: dict[str, list[tuple[float, float, float]]] = {}
+    stages: dict[str, list[stats.Estimate]] = {}
     rows = []
     for row in both.itertuples(index=False):
         key = tuple(getattr(row, k) for k in KEYS)
@@ -61,7 +65,7 @@ def compare(a: RunData, b: RunData) -> Comparison:
             for stage in times_a[key]
         }
         for stage, r in ratios.items():
-            stages.setdefault(stage, []).append((r.value, r.low, r.high))
+            stages.setdefault(stage, []).append(r)
         hybrid = ratios["hybrid"]
         rows.append(
             {
@@ -73,8 +77,23 @@ def compare(a: RunData, b: RunData) -> Comparison:
                 "alpha_b": row.alpha_b,
             }
         )
-    means = {stage: _mean(values) for stage, values in stages.items()}
+    means = {stage: stats.geometric_mean_of_estimates(values) for stage, values in stages.items()}
     return Comparison(means, pd.DataFrame(rows), _warnings(a, b, len(both)))
+
+
+def compared(a: RunData, b: RunData) -> list[Table]:
+    """Return the tables of how run `b` differs from run `a`, for runs of any kind that has them.
+
+    Raises
+    ------
+    ArgumentError
+        Runs of different kinds, of one that has no times, or without a cell in common.
+    """
+    if a.kind == b.kind == "scaling":
+        shown = compare_scaling.tables(a, b)
+        shown[0].notes += _differences(a, b)
+        return shown
+    return tables(compare(a, b), a, b)
 
 
 def tables(comparison: Comparison, a: RunData, b: RunData) -> list[Table]:
@@ -124,24 +143,6 @@ def _times(run: RunData) -> dict[tuple[object, ...], dict[str, np.ndarray]]:
     return out
 
 
-def _mean(values: list[tuple[float, float, float]]) -> stats.Estimate:
-    """Return the geometric mean of ratios with independent errors.
-
-    In logarithms the widths of the cells' intervals then add as squares.
-    """
-    logs = np.log(np.array(values))
-    centre = logs[:, 0].mean()
-    below = np.sqrt(((logs[:, 0] - logs[:, 1]) ** 2).sum()) / len(logs)
-    above = np.sqrt(((logs[:, 2] - logs[:, 0]) ** 2).sum()) / len(logs)
-    return stats.Estimate(
-        float(np.exp(centre)),
-        float(np.exp(centre - below)),
-        float(np.exp(centre + above)),
-        stats.CONFIDENCE,
-        len(values),
-    )
-
-
 def _verdict(low: float, high: float) -> str:
     if high < 1:
         return f"faster by {number(100 * (1 - high), 2)} % or more"
@@ -155,6 +156,11 @@ def _warnings(a: RunData, b: RunData, common: int) -> list[str]:
     for run in (a, b):
         if len(run.results) > common:
             found.append(f"{len(run.results) - common} cells of {run.name} are in that run alone.")
+    return found + _differences(a, b)
+
+
+def _differences(a: RunData, b: RunData) -> list[str]:
+    found = []
     for key in ("cpu", "threads", "threading_layer", "os"):
         was, now = a.meta["environment"][key], b.meta["environment"][key]
         if was != now:

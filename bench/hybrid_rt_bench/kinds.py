@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from hybrid_rt_bench.error_run import run_error
 from hybrid_rt_bench.run import Outcome, run_experiment
+from hybrid_rt_bench.scaling_run import run_scaling
 from hybrid_rt_bench.stability import run_stability
 
 Runner = Callable[..., Outcome]
@@ -14,6 +15,7 @@ RUNNERS: dict[str, Runner] = {
     "paper": run_experiment,
     "error": run_error,
     "stability": run_stability,
+    "scaling": run_scaling,
 }
 """What runs an experiment of each kind of `hybrid_rt_bench.spec.KINDS`.
 

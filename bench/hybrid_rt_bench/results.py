@@ -69,6 +69,9 @@ CELL_KEYS = ("scene", "camera", "width", "height")
 """What tells the cells of a run apart, unless its kind has keys of its own."""
 
 
+Rows = list[dict[str, Any]]
+
+
 class ReportsError(HybridRTError):
     """The folder of a run cannot be made, written or read."""
 
@@ -153,6 +156,27 @@ class RunWriter:
             self._results += [{**keys, **row} for row in results]
             self._verdicts += [{**keys, **row} for row in verdicts]
             self.meta["cells"].append({**cell, "state": "measured"})
+            self.flush()
+
+    def renew_cell(
+        self, cell: dict[str, Any], samples: list[dict[str, Any]], results: list[dict[str, Any]]
+    ) -> None:
+        """Keep a cell of which more has been measured, in place of what was kept of it before.
+
+        Rows stay where the cell's first ones were.
+        """
+
+        def renewed(kept: Rows, new: Rows) -> Rows:
+            mine = [all(row[key] == cell[key] for key in self.keys) for row in kept]
+            at = mine.index(True) if True in mine else len(kept)
+            others = [row for row, old in zip(kept, mine, strict=True) if not old]
+            return others[:at] + new + others[at:]
+
+        keys = {key: cell[key] for key in self.keys}
+        with _uninterrupted():
+            self._samples = renewed(self._samples, [{**keys, **row} for row in samples])
+            self._results = renewed(self._results, [{**keys, **row} for row in results])
+            self.meta["cells"] = renewed(self.meta["cells"], [{**cell, "state": "measured"}])
             self.flush()
 
     def fail_cell(self, cell: dict[str, Any], error: str) -> None:

@@ -16,7 +16,7 @@ from hybrid_rt_bench.plan import Plan, PlannedScene, make_plan
 from hybrid_rt_bench.progress import Reporter
 from hybrid_rt_bench.results import CELL_KEYS, ReportsError, RunWriter, create_run
 from hybrid_rt_bench.spec import Experiment, Resolution
-from hybrid_rt_bench.spec_base import SceneExperiment
+from hybrid_rt_bench.spec_base import AnyExperiment
 from hybrid_rt_bench.techniques import Technique, get_technique
 
 
@@ -100,7 +100,7 @@ def run_experiment(
 
 
 def carry_out(
-    experiment: SceneExperiment,
+    experiment: AnyExperiment,
     plan: Plan,
     *,
     reporter: Reporter,
@@ -115,7 +115,7 @@ def carry_out(
 
     Parameters
     ----------
-    experiment : SceneExperiment
+    experiment : AnyExperiment
     plan : Plan
     reporter, threads, out, command
         As in `run_experiment`.

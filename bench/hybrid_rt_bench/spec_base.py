@@ -80,7 +80,7 @@ class AnyExperiment(BaseModel):
     ----------
     options : frozenset of str
         The options of the command line that the kind knows, of ``scenes``, ``cameras``,
-        ``resolutions``, ``rounds`` and ``cases``.
+        ``resolutions``, ``rounds``, ``cases``, ``series`` and ``triangles``.
     kind : str
         Which class and which runner an experiment belongs to.
     name, title : str

@@ -103,6 +103,19 @@ def geometric_mean_of_medians(
     return Estimate(value, float(low), float(high), confidence, min(len(x) for x in rows))
 
 
+def geometric_mean_of_estimates(estimates: Sequence[Estimate]) -> Estimate:
+    """Return the geometric mean of ratios with independent errors.
+
+    In logarithms the widths of the intervals then add as squares.
+    """
+    logs = np.log(np.array([(e.value, e.low, e.high) for e in estimates]))
+    centre = logs[:, 0].mean()
+    below = np.sqrt(((logs[:, 0] - logs[:, 1]) ** 2).sum()) / len(logs)
+    above = np.sqrt(((logs[:, 2] - logs[:, 0]) ** 2).sum()) / len(logs)
+    low, value, high = np.exp([centre - below, centre, centre + above])
+    return Estimate(float(value), float(low), float(high), CONFIDENCE, len(estimates))
+
+
 def ratio_of_medians(
     numerator: ArrayLike,
     denominator: ArrayLike,

@@ -93,7 +93,7 @@ def choose(
     trace : callable
         What is asked of a tracer about the rays; by default the nearest hit.
     """
-    few = rays.take(_blocks(len(rays), sample))
+    few = sample_of(rays, sample)
     for contender in contenders:  # first touch of the BVH and of the path
         trace(contender.tracer, few)
     best = dict.fromkeys(range(len(contenders)), np.inf)
@@ -107,6 +107,11 @@ def choose(
     winner = min(best, key=best.__getitem__)
     each = {c.label: float(1e9 * best[i] / max(1, len(few))) for i, c in enumerate(contenders)}
     return Choice(contenders[winner], each)
+
+
+def sample_of(rays: hrt.Rays, count: int) -> hrt.Rays:
+    """Return about `count` of the rays, in a few runs of neighbours spread over the whole."""
+    return rays.take(_blocks(len(rays), count))
 
 
 def _blocks(n: int, sample: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

@@ -7,7 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hybrid_rt_bench.report import error_maps, error_tables, figures, pareto, pictures, stability
+from hybrid_rt_bench.report import (
+    error_maps,
+    error_tables,
+    figures,
+    pareto,
+    pictures,
+    scaling,
+    scaling_figures,
+    stability,
+)
 from hybrid_rt_bench.report.table import Table
 from hybrid_rt_bench.report.tables import all_tables
 from hybrid_rt_bench.results import ReportsError, RunData, write_bytes
@@ -33,6 +42,7 @@ FORMS = {
     "paper": Form(all_tables, (figures.plots, pictures.figures)),
     "error": Form(error_tables.all_tables, (pareto.plots, error_maps.figures)),
     "stability": Form(stability.tables, (stability.figures,)),
+    "scaling": Form(scaling.tables, (scaling_figures.plots,)),
 }
 """The form of each kind of run."""
 
@@ -93,4 +103,6 @@ def _document(run: RunData, tables: list[Table]) -> str:
 
 
 def _cell_name(cell: dict[str, Any]) -> str:
-    return ", ".join(str(cell[key]) for key in ("scene", "camera", "case") if cell.get(key))
+    return ", ".join(
+        str(cell[key]) for key in ("series", "label", "scene", "camera", "case") if cell.get(key)
+    )
