@@ -53,11 +53,10 @@ from hybrid_rt.kernels.screen import (
 BATCH = 512
 """Slots; their rows stay in the L2 cache."""
 import os
-import os
-REFILL = int(os.environ.get('RF','4'))
+REFILL = 2
 """Free lanes before new rays are put in."""
-TOGETHER = int(os.environ.get('TG','6'))
-LOOK = int(os.environ.get('LK','6'))
+TOGETHER = 9
+LOOK = 9
 """Waiting lanes before their primitives are tested."""
 
 W = simd.WIDTH
