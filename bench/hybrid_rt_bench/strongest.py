@@ -12,8 +12,13 @@ import numpy as np
 import hybrid_rt as hrt
 
 WIDTHS = (1, 4, 8, 16)
+WAYS = (  # words of the label, least width, coherent, order
+    ("", 1, False, "given"),
+    (", coherent", 4, True, "given"),
+    (", coherent, by direction", 8, True, "direction"),
+)
 BLOCKS = 8
-FINALISTS = 4
+FINALISTS = 5
 
 
 @dataclass(frozen=True)
@@ -23,7 +28,7 @@ class Candidate:
     Attributes
     ----------
     label : str
-        "packet 8, robust, coherent" and the like.
+        "packet 8, robust, coherent, by direction" and the like.
     tracer : EmbreeTracer
     """
 
@@ -49,6 +54,9 @@ class Choice:
 def candidates(robust: hrt.EmbreeTracer, default: hrt.EmbreeTracer) -> list[Candidate]:
     """Return every path over the two acceleration structures, those that this machine has.
 
+    What never paid is left out: the coherent flag for single rays, and sorting by direction without
+    that flag or in packets of 4. With the flag it pays on some rays and not on others.
+
     Parameters
     ----------
     robust, default : EmbreeTracer
@@ -60,10 +68,10 @@ def candidates(robust: hrt.EmbreeTracer, default: hrt.EmbreeTracer) -> list[Cand
         if hrt.packet_available() is not None:
             continue
         for width in WIDTHS:
-            for coherent in (False, True):
-                label = f"packet {width}, {mode}" + (", coherent" if coherent else "")
-                path = tracer.with_path(path="packet", width=width, coherent=coherent)
-                found.append(Candidate(label, path))
+            for words, least, coherent, order in WAYS:
+                if width >= least:
+                    path = tracer.with_path("packet", width=width, coherent=coherent, order=order)
+                    found.append(Candidate(f"packet {width}, {mode}{words}", path))
     return found
 
 

@@ -68,12 +68,16 @@ def test_strongest_is_the_fastest_whatever_the_order():
         assert choice.nanoseconds == pytest.approx({k: 1e9 * s for k, s in costs.items()})
 
 
-def test_candidates_are_every_path_in_both_modes():
+def test_candidates_are_every_path_that_can_differ_in_both_modes():
     robust, default = (hrt.EmbreeTracer(quad_scene(), robust=mode) for mode in (True, False))
     found = strongest.candidates(robust, default)
     labels = [candidate.label for candidate in found]
-    assert len(set(labels)) == len(labels) == 2 + 2 * 4 * 2
+    assert len(set(labels)) == len(labels) == 2 * (1 + 4 + 3 + 2)
+    ways = {(c.tracer.path, c.tracer.width, c.tracer.coherent, c.tracer.order) for c in found}
+    assert len(ways) == len(found) / 2
     for candidate in found:
+        assert ("coherent" in candidate.label) is candidate.tracer.coherent
+        assert ("by direction" in candidate.label) is (candidate.tracer.order == "direction")
         assert ("robust" in candidate.label) is candidate.tracer.robust
         assert candidate.label.startswith(candidate.tracer.path)
     rays = primary.primary_rays(hrt.Camera.look_at((0, 2, 3), (0, 0, 0), width=16, height=16))
