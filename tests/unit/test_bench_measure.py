@@ -49,6 +49,10 @@ class SlowTracer:
     def intersect(self, rays):
         self.clock.now += self.seconds * len(rays)
 
+    def with_path(self, *, threads):
+        assert threads == 1
+        return self
+
 
 class Clock:
     now = 0.0
@@ -66,6 +70,38 @@ def test_strongest_is_the_fastest_whatever_the_order():
         choice = strongest.choose(order, rays, 512, clock=clock)
         assert choice.best.label == "b"
         assert choice.nanoseconds == pytest.approx({k: 1e9 * s for k, s in costs.items()})
+
+
+class DisturbedTracer(SlowTracer):
+    """A tracer that something else holds up for a while, three calls of four."""
+
+    calls = 0
+
+    def intersect(self, rays):
+        super().intersect(rays)
+        self.calls += 1
+        if self.calls % 4:
+            self.clock.now += 1.0
+
+
+def test_what_disturbs_some_blocks_of_every_round_does_not_count():
+    """Whole rounds would all be disturbed, and the slower candidate would win."""
+    clock = Clock()
+    n = 5 * strongest.SHORTEST
+    rays = hrt.Rays.from_arrays(np.zeros((n, 3)), np.ones((n, 3)))
+    contenders = [
+        strongest.Candidate("slow", SlowTracer(2e-9, clock)),
+        strongest.Candidate("fast", DisturbedTracer(1e-9, clock)),
+    ]
+    choice = strongest.choose(contenders, rays, n, clock=clock)
+    assert choice.best.label == "fast"
+    assert choice.nanoseconds == pytest.approx({"slow": 2.0, "fast": 1.0})
+
+
+@pytest.mark.parametrize(("n", "sample"), [(0, 100), (1, 100), (5000, 9000), (10**6, 131072)])
+def test_blocks_are_apart_and_as_many_rays_as_asked_for(n, sample):
+    places = np.concatenate([np.arange(n)[block] for block in strongest._blocks(n, sample)])
+    assert len(np.unique(places)) == len(places) == min(n, sample)
 
 
 def test_candidates_are_every_path_that_can_differ_in_both_modes():
