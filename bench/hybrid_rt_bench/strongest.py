@@ -12,8 +12,14 @@ import numpy as np
 import hybrid_rt as hrt
 
 WIDTHS = (1, 4, 8, 16)
+WAYS = (  # words of the label, least width, coherent, order
+    ("", 1, False, "given"),
+    (", coherent", 4, True, "given"),
+    (", coherent, by direction", 8, True, "direction"),
+)
 BLOCKS = 8
-FINALISTS = 4
+SHORTEST = 8192  # rays of a block, beside which the time of a call is small
+FINALISTS = 5
 
 
 @dataclass(frozen=True)
@@ -23,7 +29,7 @@ class Candidate:
     Attributes
     ----------
     label : str
-        "packet 8, robust, coherent" and the like.
+        "packet 8, robust, coherent, by direction" and the like.
     tracer : EmbreeTracer
     """
 
@@ -39,7 +45,7 @@ class Choice:
     ----------
     best : Candidate
     nanoseconds : dict of float
-        Shortest time a ray, on the sample, by label.
+        Shortest time a ray, on the sample and on one thread, by label.
     """
 
     best: Candidate
@@ -48,6 +54,9 @@ class Choice:
 
 def candidates(robust: hrt.EmbreeTracer, default: hrt.EmbreeTracer) -> list[Candidate]:
     """Return every path over the two acceleration structures, those that this machine has.
+
+    What never paid is left out: the coherent flag for single rays, and sorting by direction without
+    that flag or in packets of 4. With the flag it pays on some rays and not on others.
 
     Parameters
     ----------
@@ -60,10 +69,10 @@ def candidates(robust: hrt.EmbreeTracer, default: hrt.EmbreeTracer) -> list[Cand
         if hrt.packet_available() is not None:
             continue
         for width in WIDTHS:
-            for coherent in (False, True):
-                label = f"packet {width}, {mode}" + (", coherent" if coherent else "")
-                path = tracer.with_path(path="packet", width=width, coherent=coherent)
-                found.append(Candidate(label, path))
+            for words, least, coherent, order in WAYS:
+                if width >= least:
+                    path = tracer.with_path("packet", width=width, coherent=coherent, order=order)
+                    found.append(Candidate(f"packet {width}, {mode}{words}", path))
     return found
 
 
@@ -81,8 +90,10 @@ def choose(
 ) -> Choice:
     """Return the candidate that traces `rays` fastest.
 
-    Two rounds over all, then four more among the best few. The shortest time counts: what disturbs
-    a run of a few milliseconds only ever makes it longer.
+    Two rounds over all, then four more among the best few. The shortest time of each block of
+    neighbours counts: what disturbs a run of a millisecond only ever makes it longer. All trace on
+    one thread, which finds an undisturbed moment on a busy machine where several that wait for each
+    other find none; and what is fastest on one core is so on each, since they share no work.
 
     Parameters
     ----------
@@ -93,30 +104,35 @@ def choose(
     trace : callable
         What is asked of a tracer about the rays; by default the nearest hit.
     """
-    few = sample_of(rays, sample)
-    for contender in contenders:  # first touch of the BVH and of the path
-        trace(contender.tracer, few)
-    best = dict.fromkeys(range(len(contenders)), np.inf)
+    blocks = [rays.take(block) for block in _blocks(len(rays), sample)]
+    alone = [contender.tracer.with_path(threads=1) for contender in contenders]
+    for tracer in alone:  # first touch of the BVH and of the path
+        trace(tracer, blocks[0])
+    best = np.full((len(contenders), len(blocks)), np.inf)
     for rounds, entrants in ((2, len(contenders)), (4, FINALISTS)):
-        order = sorted(best, key=best.__getitem__)[:entrants]
+        order = np.argsort(best.sum(axis=1), kind="stable")[:entrants]
         for _ in range(rounds):
             for index in order:
-                start = clock()
-                trace(contenders[index].tracer, few)
-                best[index] = min(best[index], clock() - start)
-    winner = min(best, key=best.__getitem__)
-    each = {c.label: float(1e9 * best[i] / max(1, len(few))) for i, c in enumerate(contenders)}
-    return Choice(contenders[winner], each)
+                for k, block in enumerate(blocks):
+                    start = clock()
+                    trace(alone[index], block)
+                    best[index, k] = min(best[index, k], clock() - start)
+    seconds = best.sum(axis=1)
+    count = max(1, sum(map(len, blocks)))
+    each = {c.label: float(1e9 * seconds[i] / count) for i, c in enumerate(contenders)}
+    return Choice(contenders[int(np.argmin(seconds))], each)
 
 
 def sample_of(rays: hrt.Rays, count: int) -> hrt.Rays:
     """Return about `count` of the rays, in a few runs of neighbours spread over the whole."""
-    return rays.take(_blocks(len(rays), count))
+    rows = np.arange(len(rays))
+    return rays.take(np.concatenate([rows[block] for block in _blocks(len(rays), count)]))
 
 
-def _blocks(n: int, sample: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    if n <= sample:
-        return np.arange(n)
-    length = sample // BLOCKS
-    starts = np.linspace(0, n - length, BLOCKS).astype(np.int64)
-    return np.asarray((starts[:, None] + np.arange(length)).ravel())
+def _blocks(n: int, sample: int) -> list[slice]:
+    """Return runs of neighbours, spread over `n` rays, that are about `sample` rays together."""
+    sample = min(n, sample)
+    count = min(BLOCKS, max(1, sample // SHORTEST))
+    length = sample // count
+    starts = np.linspace(0, n - length, count).astype(np.int64)
+    return [slice(int(start), int(start) + length) for start in starts]

@@ -49,6 +49,10 @@ class SlowTracer:
     def intersect(self, rays):
         self.clock.now += self.seconds * len(rays)
 
+    def with_path(self, *, threads):
+        assert threads == 1
+        return self
+
 
 class Clock:
     now = 0.0
@@ -68,12 +72,48 @@ def test_strongest_is_the_fastest_whatever_the_order():
         assert choice.nanoseconds == pytest.approx({k: 1e9 * s for k, s in costs.items()})
 
 
-def test_candidates_are_every_path_in_both_modes():
+class DisturbedTracer(SlowTracer):
+    """A tracer that something else holds up for a while, three calls of four."""
+
+    calls = 0
+
+    def intersect(self, rays):
+        super().intersect(rays)
+        self.calls += 1
+        if self.calls % 4:
+            self.clock.now += 1.0
+
+
+def test_what_disturbs_some_blocks_of_every_round_does_not_count():
+    """Whole rounds would all be disturbed, and the slower candidate would win."""
+    clock = Clock()
+    n = 5 * strongest.SHORTEST
+    rays = hrt.Rays.from_arrays(np.zeros((n, 3)), np.ones((n, 3)))
+    contenders = [
+        strongest.Candidate("slow", SlowTracer(2e-9, clock)),
+        strongest.Candidate("fast", DisturbedTracer(1e-9, clock)),
+    ]
+    choice = strongest.choose(contenders, rays, n, clock=clock)
+    assert choice.best.label == "fast"
+    assert choice.nanoseconds == pytest.approx({"slow": 2.0, "fast": 1.0})
+
+
+@pytest.mark.parametrize(("n", "sample"), [(0, 100), (1, 100), (5000, 9000), (10**6, 131072)])
+def test_blocks_are_apart_and_as_many_rays_as_asked_for(n, sample):
+    places = np.concatenate([np.arange(n)[block] for block in strongest._blocks(n, sample)])
+    assert len(np.unique(places)) == len(places) == min(n, sample)
+
+
+def test_candidates_are_every_path_that_can_differ_in_both_modes():
     robust, default = (hrt.EmbreeTracer(quad_scene(), robust=mode) for mode in (True, False))
     found = strongest.candidates(robust, default)
     labels = [candidate.label for candidate in found]
-    assert len(set(labels)) == len(labels) == 2 + 2 * 4 * 2
+    assert len(set(labels)) == len(labels) == 2 * (1 + 4 + 3 + 2)
+    ways = {(c.tracer.path, c.tracer.width, c.tracer.coherent, c.tracer.order) for c in found}
+    assert len(ways) == len(found) / 2
     for candidate in found:
+        assert ("coherent" in candidate.label) is candidate.tracer.coherent
+        assert ("by direction" in candidate.label) is (candidate.tracer.order == "direction")
         assert ("robust" in candidate.label) is candidate.tracer.robust
         assert candidate.label.startswith(candidate.tracer.path)
     rays = primary.primary_rays(hrt.Camera.look_at((0, 2, 3), (0, 0, 0), width=16, height=16))
