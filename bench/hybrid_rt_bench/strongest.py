@@ -104,7 +104,7 @@ def choose(
     trace : callable
         What is asked of a tracer about the rays; by default the nearest hit.
     """
-    blocks = [rays.take(block) for block in _blocks(len(rays), sample)]
+    blocks = [rays.take(block) for block in _blocks(len(rays), sample, SHORTEST)]
     alone = [contender.tracer.with_path(threads=1) for contender in contenders]
     for tracer in alone:  # first touch of the BVH and of the path
         trace(tracer, blocks[0])
@@ -126,13 +126,13 @@ def choose(
 def sample_of(rays: hrt.Rays, count: int) -> hrt.Rays:
     """Return about `count` of the rays, in a few runs of neighbours spread over the whole."""
     rows = np.arange(len(rays))
-    return rays.take(np.concatenate([rows[block] for block in _blocks(len(rays), count)]))
+    return rays.take(np.concatenate([rows[block] for block in _blocks(len(rays), count, 1)]))
 
 
-def _blocks(n: int, sample: int) -> list[slice]:
+def _blocks(n: int, sample: int, shortest: int) -> list[slice]:
     """Return runs of neighbours, spread over `n` rays, that are about `sample` rays together."""
     sample = min(n, sample)
-    count = min(BLOCKS, max(1, sample // SHORTEST))
+    count = min(BLOCKS, max(1, sample // shortest))
     length = sample // count
     starts = np.linspace(0, n - length, count).astype(np.int64)
     return [slice(int(start), int(start) + length) for start in starts]
