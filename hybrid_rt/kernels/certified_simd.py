@@ -52,31 +52,26 @@ from hybrid_rt.kernels.screen import (
 
 BATCH = 512
 """Slots; their rows stay in the L2 cache."""
-import os
-REFILL = 2
-"""Free lanes before new rays are put in."""
-TOGETHER = 9
-LOOK = 9
-"""Waiting lanes before their primitives are tested."""
+REFILL = 6
+"""Free lanes before rays are put in."""
+FEW = 8
+"""Lanes with which stepping goes on though other stages have work."""
 
 W = simd.WIDTH
 STRIDE = BATCH + W  # slots in a row: what is loaded past the last one is not used
 
-# Rows of slots, float32: the ray on the screen, the s at which it ends, its origin along the axes
-# of the exact test; then its result: the s up to which it is free, and the end that a hit has set.
-X0, Y0, Z0, SX, SY, SZ, INV_X, INV_Y, END, Z_ERROR, OX, OY, OZ, R_S, R_END, F32_ROWS = range(16)
-# int32: the ray, the pixel where it starts, the axis kz of the exact test, how it ends if it meets
-# nothing; then its result: a status or ARRIVED, best hit and its pixel, steps.
-RAY, CX, CY, KZ, HOW, R_CODE, R_BEST, R_X, R_Y, R_STEPS, I32_ROWS = range(11)
+# Rows of slots, float32: the ray on the screen, its end and the s up to which it is free, by how
+# much its depth may be too low, its origin along the axes of the exact test.
+X0, Y0, Z0, SX, SY, SZ, INV_X, INV_Y, END, S, Z_ERROR, OX, OY, OZ, F32_ROWS = range(15)
+# int32: the ray, the axis kz of the exact test, how it ends if it meets nothing; then its state: the
+# pixel, level (or PASSED), steps, place in the pixel's list, the primitive tested last, exact tests,
+# best hit and its pixel, status or ARRIVED.
+RAY, KZ, HOW, CX, CY, LEVEL, STEPS, ENTRY, PRIM, TESTS, BEST, BEST_X, BEST_Y, CODE, I32_ROWS = range(15)
 # float64: what leads from s to t, limits, the shear of the exact test; bounds of the best hit's t.
-SCALE, Z, GZ, T_NEAR, T_FAR, SHEAR_X, SHEAR_Y, SHEAR_Z, R_LOW, R_HIGH, F64_ROWS = range(11)
+SCALE, Z, GZ, T_NEAR, T_FAR, SHEAR_X, SHEAR_Y, SHEAR_Z, LOW, HIGH, F64_ROWS = range(11)
 
-# Rows of lanes that only tests use, float32: OX, OY, OZ. int32: the primitive tested first and the
-# three tested last, and those rows of slots.
-L_Z_ERROR, L_OX, L_OY, L_OZ, LANE_F32 = range(5)
-L_KZ, L_X, L_Y, L_TESTS, LANE_I32 = range(5)
-L_SCALE, L_Z, L_GZ, L_NEAR, L_SHEAR_X, L_SHEAR_Y, L_SHEAR_Z, L_LOW, L_HIGH, LANE_F64 = range(10)
-
+PASSED = -1
+"""Level of a ray that nothing in its pixel stops any more."""
 ARRIVED = -1
 """Result of a ray that has come to its end, or to its hit."""
 
@@ -214,6 +209,13 @@ def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_ou
     cy = simd.minimum(simd.maximum(simd.to_i32(y0), I(0)), I(height - 1))
     put(slots_i, CX, slot, cx, walks)
     put(slots_i, CY, slot, cy, walks)
+    simd.store(slots_f, S * STRIDE + slot, simd.f32(0.0))
+    for row in (LEVEL, STEPS, TESTS):
+        simd.store(slots_i, row * STRIDE + slot, simd.i32(0))
+    for row in (PRIM, BEST, CODE):
+        simd.store(slots_i, row * STRIDE + slot, simd.i32(-1))
+    simd.store(slots_d, LOW * STRIDE + slot, simd.f64(INFINITY))
+    put(slots_d, HIGH, slot, stop, walks)
     put(slots_i, HOW, slot, how, walks)
     put(slots_d, SCALE, slot, scale, walks)
     put(slots_d, Z, slot, z, walks)
@@ -243,12 +245,6 @@ def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_ou
 def put(rows, row, slot, v, m):
     """Write the lanes of m to a row, one slot after the other."""
     simd.store(rows, row * STRIDE + slot, simd.compress(v, m))
-
-
-@inlined
-def take(rows, row, slot, fresh, old):
-    """Return lanes with those of `fresh` taken from a row, one slot after the other."""
-    return simd.expand(simd.load(rows, row * STRIDE + slot), fresh, old)
 
 
 @inlined
@@ -316,159 +312,92 @@ def test_primitives(prim, m, corners, kz, ox, oy, oz, shear_x, shear_y, shear_z,
     return missed, hit, low, high
 
 
-@kernel
-def walk(
-    many, slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d, prim_id, nearest, rest, planes,
-    shape, cells, bits, corners, max_steps, max_tests, any_hit,
-):  # fmt: skip
-    """March the rays of slots 0..many-1 to their results; return the number of exact tests.
+@inlined
+def at(rows, row, slot, m):
+    """Return a row at the slots of lanes m."""
+    return simd.gather(rows, slot + I(row * STRIDE), m, 0)
 
-    prim_id, nearest (H * W * K,), rest (H * W,); cells and bits: a pyramid and the two logarithms of
-    its size; lanes_*: scratch.
+
+@inlined
+def leave(rows, row, slot, v, m):
+    """Write lanes m to their slots of a row."""
+    simd.scatter(rows, slot + I(row * STRIDE), v, m)
+
+
+@inlined
+def append(queue, many, slot, m):
+    """Put the slots of lanes m at the end of a queue; return how many there are."""
+    simd.store(queue, many, simd.compress(slot, m))
+    return many + simd.count(m)
+
+
+@kernel
+def step(
+    ready, n_ready, looks, n_looks, more, slots_f, slots_i, shape, cells, bits, max_steps
+):  # fmt: skip
+    """Walk the rays of `ready` until they end or something may be in their way; those go to `looks`.
+
+    With `more` (others wait) a few that are still on their way may be left in `ready`. Return how
+    many are in both queues.
     """
     width, height, length, top = shape
     row_bits, column_bits = bits
-    zero = simd.f32(0.0)
     none = simd.mask(False)
+    zero = simd.f32(0.0)
     x0, y0, z0, sx, sy, sz = zero, zero, zero, zero, zero, zero
     inv_x, inv_y, end, s = zero, zero, zero, zero
     cx, cy, level, slot = simd.i32(0), simd.i32(0), simd.i32(0), simd.i32(0)
-    code, steps, entry = simd.i32(ARRIVED), simd.i32(0), simd.i32(0)
-    best, prim = simd.i32(-1), simd.i32(-1)
-    active, looking, testing, passed, ended = none, none, none, none, none
+    code, steps = simd.i32(ARRIVED), simd.i32(0)
+    active, passed, stopped, ended = none, none, none, none
     taken = 0
-    tests = 0
     while True:
-        busy = active | looking | testing
-        idle = W - simd.count(busy)
-        if idle == W or (idle >= REFILL and taken < many):
-            if simd.any_(ended):
-                put_results(
-                    ended, slot, s, end, code, steps, best, slots_f, slots_i, slots_d, lanes_i, lanes_d
-                )
-            fresh = ~busy & (simd.expand(simd.iota(), ~busy, I(W)) < I(min(many - taken, W)))
-            x0 = take(slots_f, X0, taken, fresh, x0)
-            y0 = take(slots_f, Y0, taken, fresh, y0)
-            z0 = take(slots_f, Z0, taken, fresh, z0)
-            sx = take(slots_f, SX, taken, fresh, sx)
-            sy = take(slots_f, SY, taken, fresh, sy)
-            sz = take(slots_f, SZ, taken, fresh, sz)
-            inv_x = take(slots_f, INV_X, taken, fresh, inv_x)
-            inv_y = take(slots_f, INV_Y, taken, fresh, inv_y)
-            end = take(slots_f, END, taken, fresh, end)
-            cx = take(slots_i, CX, taken, fresh, cx)
-            cy = take(slots_i, CY, taken, fresh, cy)
-            slot = simd.expand(simd.iota() + I(taken), fresh, slot)
-            s = simd.select(fresh, F(0.0), s)
-            level = simd.select(fresh, I(0), level)
-            code = simd.select(fresh, I(ARRIVED), code)
-            steps = simd.select(fresh, I(0), steps)
-            best = simd.select(fresh, I(-1), best)
-            prim = simd.select(fresh, I(-1), prim)
-            take_for_tests(taken, fresh, slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d)
-            active = active | fresh
-            ended = none
+        idle = W - simd.count(active)
+        over = taken == n_ready
+        leaving = over and idle > W - FEW and (more or n_looks > 0)
+        if idle == W or leaving or (idle >= REFILL and not over):
+            out = stopped | ended
+            if leaving:
+                out = out | active
+            if simd.any_(out):
+                leave(slots_f, S, slot, s, out)
+                leave(slots_i, CX, slot, cx, out)
+                leave(slots_i, CY, slot, cy, out)
+                leave(slots_i, STEPS, slot, steps, out)
+                n_looks = append(looks, n_looks, slot, stopped)
+                leave(slots_i, ENTRY, slot, simd.i32(0), stopped)
+                leave(slots_i, CODE, slot, code, ended)
+            if leaving:
+                leave(slots_i, LEVEL, slot, level, active)
+                return append(ready, 0, slot, active), n_looks
+            if over:
+                return 0, n_looks
+            stopped, ended = none, none
+            fresh = ~active
+            fresh = fresh & (simd.expand(simd.iota(), fresh, I(W)) < I(min(n_ready - taken, W)))
+            slot = simd.expand(simd.load(ready, taken), fresh, slot)
             taken += simd.count(fresh)
-            if not simd.any_(active | looking | testing):
-                break
-        right, down = sx > F(0.0), sy > F(0.0)
-        far_x = simd.to_i32(right)
-        far_y = simd.to_i32(down)
-
-        if simd.any_(testing) and (
-            simd.count(testing) >= TOGETHER or not simd.any_(active | looking)
-        ):
-            tests += simd.count(testing)
-            t_near = simd.load(lanes_d, L_NEAR * W)
-            best_low = simd.load(lanes_d, L_LOW * W)
-            missed, hit, low, high = test_primitives(
-                prim, testing, corners, simd.load(lanes_i, L_KZ * W),
-                simd.to_f64(simd.load(lanes_f, L_OX * W)),
-                simd.to_f64(simd.load(lanes_f, L_OY * W)),
-                simd.to_f64(simd.load(lanes_f, L_OZ * W)),
-                simd.load(lanes_d, L_SHEAR_X * W), simd.load(lanes_d, L_SHEAR_Y * W),
-                simd.load(lanes_d, L_SHEAR_Z * W), t_near, simd.load(lanes_d, L_HIGH * W),
-            )  # fmt: skip
-            # A hit that rounding may put before or after the best one is a tie.
-            unsure = testing & ~missed & (~hit | ((best >= I(0)) & (high >= best_low)))
-            code = simd.select(unsure, I(UNDECIDED), code)
-            ended = ended | unsure
-            hit = testing & hit & ~missed & ~unsure
-            looking = looking | (testing & ~unsure)
-            testing = none
-            if simd.any_(hit):
-                best = simd.select(hit, prim, best)
-                simd.store_masked(lanes_i, L_X * W, cx, hit)
-                simd.store_masked(lanes_i, L_Y * W, cy, hit)
-                simd.store_masked(lanes_d, L_LOW * W, low, hit)
-                simd.store_masked(lanes_d, L_HIGH * W, high, hit)
-                if any_hit:
-                    code = simd.select(hit, I(HIT), code)
-                    ended = ended | hit
-                    looking = looking & ~hit
-                else:
-                    along = high - t_near
-                    at_hit = along / (
-                        simd.load(lanes_d, L_Z * W) + along * simd.load(lanes_d, L_GZ * W)
-                    )
-                    cut = simd.to_f32(at_hit * simd.load(lanes_d, L_SCALE * W) * BEYOND)
-                    # at_hit is negative behind the eye
-                    end = simd.select(hit & (at_hit >= 0.0), simd.minimum(cut, end), end)
-
-        if simd.any_(looking) and (simd.count(looking) >= LOOK or not simd.any_(active)):
-            at_x = edge_at(cx + far_x, simd.i32(0), x0, inv_x)
-            at_y = edge_at(cy + far_y, simd.i32(0), y0, inv_y)
-            s_exit = simd.maximum(simd.minimum(simd.minimum(at_x, at_y), end), s)
-            z_in, z_out = z0 + sz * s, z0 + sz * s_exit
-            lowest = simd.select(sz < F(0.0), z_out, z_in)
-            pixel = cy * I(width) + cx
-            at = pixel * I(length) + entry
-            full = looking & (entry == I(length))
-            there = looking & ~full
-            found = simd.gather(prim_id, at, there, I(-1))
-            bound = simd.gather(nearest, at, there, F(0.0))
-            past = there & ((found < I(0)) | (bound < lowest))
-            there = there & ~past
-            if simd.any_(full):
-                others = simd.gather(rest, pixel, full, F(0.0))
-                hidden = full & ~(lowest > others)
-                code = simd.select(hidden, I(HIDDEN), code)
-                ended = ended | hidden
-                looking = looking & ~hidden
-                past = past | (full & ~hidden)
-            looking = looking & ~past
-            active = active | past
-            passed = passed | past
-            entry = simd.select(there, entry + I(1), entry)
-            there = there & (found != prim) & (found != best)
-            if simd.any_(there):
-                row = found * I(PLANE_ROW)
-                a = simd.gather(planes, row + I(SLOPE_X), there, F(0.0))
-                b = simd.gather(planes, row + I(SLOPE_Y), there, F(0.0))
-                c = simd.gather(planes, row + I(DEPTH), there, F(0.0))
-                px = simd.gather(planes, row + I(REFERENCE_X), there, F(0.0))
-                py = simd.gather(planes, row + I(REFERENCE_Y), there, F(0.0))
-                error = simd.gather(planes, row + I(ERROR), there, F(0.0))
-                above = z_in - (c + a * (x0 + sx * s - px) + b * (y0 + sy * s - py))
-                then = z_out - (c + a * (x0 + sx * s_exit - px) + b * (y0 + sy * s_exit - py))
-                front = simd.minimum(above, then) > error
-                behind = simd.maximum(above, then) + simd.load(lanes_f, L_Z_ERROR * W) < -error
-                there = there & ~(front | behind)
-                done = simd.load(lanes_i, L_TESTS * W)
-                tired = there & (done == I(max_tests))
-                code = simd.select(tired, I(EXHAUSTED), code)
-                ended = ended | tired
-                looking = looking & ~tired
-                there = there & ~tired
-                simd.store_masked(lanes_i, L_TESTS * W, done + I(1), there)
-                prim = simd.select(there, found, prim)
-                testing = testing | there
-                looking = looking & ~there
-
-        # One step of every lane that can take one.
+            x0 = simd.gather(slots_f, slot + I(X0 * STRIDE), fresh, x0)
+            y0 = simd.gather(slots_f, slot + I(Y0 * STRIDE), fresh, y0)
+            z0 = simd.gather(slots_f, slot + I(Z0 * STRIDE), fresh, z0)
+            sx = simd.gather(slots_f, slot + I(SX * STRIDE), fresh, sx)
+            sy = simd.gather(slots_f, slot + I(SY * STRIDE), fresh, sy)
+            sz = simd.gather(slots_f, slot + I(SZ * STRIDE), fresh, sz)
+            inv_x = simd.gather(slots_f, slot + I(INV_X * STRIDE), fresh, inv_x)
+            inv_y = simd.gather(slots_f, slot + I(INV_Y * STRIDE), fresh, inv_y)
+            end = simd.gather(slots_f, slot + I(END * STRIDE), fresh, end)
+            s = simd.gather(slots_f, slot + I(S * STRIDE), fresh, s)
+            cx = simd.gather(slots_i, slot + I(CX * STRIDE), fresh, cx)
+            cy = simd.gather(slots_i, slot + I(CY * STRIDE), fresh, cy)
+            level = simd.gather(slots_i, slot + I(LEVEL * STRIDE), fresh, level)
+            steps = simd.gather(slots_i, slot + I(STEPS * STRIDE), fresh, steps)
+            code = simd.select(fresh, I(ARRIVED), code)
+            passed = fresh & (level == I(PASSED))
+            level = simd.select(passed, I(0), level)
+            active = active | fresh
         lx, ly = cx >> level, cy >> level
-        at_x = edge_at(lx + far_x, level, x0, inv_x)
-        at_y = edge_at(ly + far_y, level, y0, inv_y)
+        right, down = sx > F(0.0), sy > F(0.0)
+        at_x = edge_at(lx + simd.to_i32(right), level, x0, inv_x)
+        at_y = edge_at(ly + simd.to_i32(down), level, y0, inv_y)
         s_exit = simd.maximum(simd.minimum(simd.minimum(at_x, at_y), end), s)
         new = active & ~passed
         tired = new & (steps == I(max_steps))
@@ -483,8 +412,7 @@ def walk(
         lowest = z0 + sz * simd.select(sz < F(0.0), s_exit, s)
         blocked = new & (near > F(0.0)) & ~(lowest > near)
         stops = blocked & (level == I(0))
-        entry = simd.select(stops, I(0), entry)
-        looking = looking | stops
+        stopped = stopped | stops
         active = active & ~stops
         level = simd.select(blocked & ~stops, level - I(1), level)
         free = active & ~blocked
@@ -512,48 +440,157 @@ def walk(
         up = level + I(1)
         other = ((cx >> up) != (lx >> I(1))) | ((cy >> up) != (ly >> I(1)))
         level = simd.select(go & other & (level < I(top)), up, level)
-    return tests
 
 
-@inlined
-def take_for_tests(taken, fresh, slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d):
-    """Bring what only exact tests need from slots to the lanes of `fresh`."""
-    for row in range(LANE_F32):
-        simd.store(
-            lanes_f, row * W, take(slots_f, Z_ERROR + row, taken, fresh, simd.load(lanes_f, row * W))
-        )
-    simd.store(
-        lanes_i, L_KZ * W, take(slots_i, KZ, taken, fresh, simd.load(lanes_i, L_KZ * W))
-    )
-    simd.store_masked(lanes_i, L_TESTS * W, simd.i32(0), fresh)
-    for row in range(L_NEAR + 1):
-        v = take(slots_d, SCALE + row, taken, fresh, simd.load(lanes_d, row * W))
-        simd.store(lanes_d, row * W, v)
-    for row in range(3):
-        v = take(slots_d, SHEAR_X + row, taken, fresh, simd.load(lanes_d, (L_SHEAR_X + row) * W))
-        simd.store(lanes_d, (L_SHEAR_X + row) * W, v)
-    simd.store_masked(lanes_d, L_LOW * W, simd.f64(INFINITY), fresh)
-    v = take(slots_d, T_FAR, taken, fresh, simd.load(lanes_d, L_HIGH * W))
-    simd.store(lanes_d, L_HIGH * W, v)
+@kernel
+def look(
+    looks, n_looks, ready, n_ready, tests, slots_f, slots_i, prim_id, nearest, rest, planes, shape,
+    max_tests,
+):  # fmt: skip
+    """Go through the lists of the pixels that the rays of `looks` have come to.
+
+    A ray goes to `tests` with a primitive that it may hit, back to `ready` if there is none left, or
+    ends. Return how many are in these two queues.
+    """
+    width, height, length, top = shape
+    n_tests = 0
+    for k in range(0, n_looks, W):
+        live = simd.first(n_looks - k)
+        slot = simd.load(looks, k)
+        slot = simd.select(live, slot, I(0))
+        x0, y0, z0 = at(slots_f, X0, slot, live), at(slots_f, Y0, slot, live), at(slots_f, Z0, slot, live)
+        sx, sy, sz = at(slots_f, SX, slot, live), at(slots_f, SY, slot, live), at(slots_f, SZ, slot, live)
+        s, end = at(slots_f, S, slot, live), at(slots_f, END, slot, live)
+        cx, cy = at(slots_i, CX, slot, live), at(slots_i, CY, slot, live)
+        entry = at(slots_i, ENTRY, slot, live)
+        prim, best = at(slots_i, PRIM, slot, live), at(slots_i, BEST, slot, live)
+        at_x = edge_at(cx + simd.to_i32(sx > F(0.0)), simd.i32(0), x0, at(slots_f, INV_X, slot, live))
+        at_y = edge_at(cy + simd.to_i32(sy > F(0.0)), simd.i32(0), y0, at(slots_f, INV_Y, slot, live))
+        s_exit = simd.maximum(simd.minimum(simd.minimum(at_x, at_y), end), s)
+        z_in, z_out = z0 + sz * s, z0 + sz * s_exit
+        x_in, y_in, x_out, y_out = x0 + sx * s, y0 + sy * s, x0 + sx * s_exit, y0 + sy * s_exit
+        z_error = at(slots_f, Z_ERROR, slot, live)
+        lowest = simd.select(sz < F(0.0), z_out, z_in)
+        pixel = cy * I(width) + cx
+        seek = live
+        past = simd.mask(False)
+        found = prim
+        while simd.any_(seek):
+            full = seek & (entry == I(length))
+            if simd.any_(full):
+                others = simd.gather(rest, pixel, full, F(0.0))
+                hidden = full & ~(lowest > others)
+                leave(slots_i, CODE, slot, simd.i32(HIDDEN), hidden)
+                past = past | (full & ~hidden)
+                seek = seek & ~full
+            place = pixel * I(length) + entry
+            found = simd.gather(prim_id, place, seek, found)
+            bound = simd.gather(nearest, place, seek, F(0.0))
+            beyond = seek & ((found < I(0)) | (bound < lowest))
+            past = past | beyond
+            seek = seek & ~beyond
+            entry = simd.select(seek, entry + I(1), entry)
+            there = seek & (found != prim) & (found != best)
+            if simd.any_(there):
+                row = found * I(PLANE_ROW)
+                a = simd.gather(planes, row + I(SLOPE_X), there, F(0.0))
+                b = simd.gather(planes, row + I(SLOPE_Y), there, F(0.0))
+                c = simd.gather(planes, row + I(DEPTH), there, F(0.0))
+                px = simd.gather(planes, row + I(REFERENCE_X), there, F(0.0))
+                py = simd.gather(planes, row + I(REFERENCE_Y), there, F(0.0))
+                error = simd.gather(planes, row + I(ERROR), there, F(0.0))
+                above = z_in - (c + a * (x_in - px) + b * (y_in - py))
+                then = z_out - (c + a * (x_out - px) + b * (y_out - py))
+                front = simd.minimum(above, then) > error
+                behind = simd.maximum(above, then) + z_error < -error
+                there = there & ~(front | behind)
+                if simd.any_(there):
+                    seek = seek & ~there
+                    done = at(slots_i, TESTS, slot, there)
+                    tired = there & (done == I(max_tests))
+                    leave(slots_i, CODE, slot, simd.i32(EXHAUSTED), tired)
+                    there = there & ~tired
+                    leave(slots_i, TESTS, slot, done + I(1), there)
+                    leave(slots_i, PRIM, slot, found, there)
+                    leave(slots_i, ENTRY, slot, entry, there)
+                    n_tests = append(tests, n_tests, slot, there)
+        leave(slots_i, LEVEL, slot, simd.i32(PASSED), past)
+        n_ready = append(ready, n_ready, slot, past)
+    return n_ready, n_tests
 
 
-@inlined
-def put_results(ended, slot, s, end, code, steps, best, slots_f, slots_i, slots_d, lanes_i, lanes_d):
-    """Leave the results of the lanes of `ended` in their slots."""
-    simd.scatter(slots_f, slot + I(R_S * STRIDE), s, ended)
-    simd.scatter(slots_f, slot + I(R_END * STRIDE), end, ended)
-    simd.scatter(slots_i, slot + I(R_CODE * STRIDE), code, ended)
-    simd.scatter(slots_i, slot + I(R_STEPS * STRIDE), steps, ended)
-    left = simd.bits(ended & (best >= I(0)))
-    simd.scatter(slots_i, slot + I(R_BEST * STRIDE), best, ended)
-    while left:
-        lane = simd.lowest(left)
-        left &= left - 1
-        at = simd.extract(slot, lane)
-        slots_i[R_X * STRIDE + at] = lanes_i[L_X * W + lane]
-        slots_i[R_Y * STRIDE + at] = lanes_i[L_Y * W + lane]
-        slots_d[R_LOW * STRIDE + at] = lanes_d[L_LOW * W + lane]
-        slots_d[R_HIGH * STRIDE + at] = lanes_d[L_HIGH * W + lane]
+@kernel
+def test(tests, n_tests, looks, slots_f, slots_i, slots_d, corners, any_hit):
+    """Intersect the rays of `tests` with their primitives; they go on to `looks` or end.
+
+    Return how many are in `looks`.
+    """
+    n_looks = 0
+    for k in range(0, n_tests, W):
+        live = simd.first(n_tests - k)
+        slot = simd.select(live, simd.load(tests, k), I(0))
+        prim, best = at(slots_i, PRIM, slot, live), at(slots_i, BEST, slot, live)
+        t_near = at(slots_d, T_NEAR, slot, live)
+        missed, hit, low, high = test_primitives(
+            prim, live, corners, at(slots_i, KZ, slot, live),
+            simd.to_f64(at(slots_f, OX, slot, live)), simd.to_f64(at(slots_f, OY, slot, live)),
+            simd.to_f64(at(slots_f, OZ, slot, live)), at(slots_d, SHEAR_X, slot, live),
+            at(slots_d, SHEAR_Y, slot, live), at(slots_d, SHEAR_Z, slot, live),
+            t_near, at(slots_d, HIGH, slot, live),
+        )  # fmt: skip
+        # A hit that rounding may put before or after the best one is a tie.
+        tie = (best >= I(0)) & (high >= at(slots_d, LOW, slot, live))
+        unsure = live & ~missed & (~hit | tie)
+        leave(slots_i, CODE, slot, simd.i32(UNDECIDED), unsure)
+        on = live & ~unsure
+        hit = on & hit & ~missed
+        if simd.any_(hit):
+            leave(slots_i, BEST, slot, prim, hit)
+            leave(slots_i, BEST_X, slot, at(slots_i, CX, slot, hit), hit)
+            leave(slots_i, BEST_Y, slot, at(slots_i, CY, slot, hit), hit)
+            leave(slots_d, LOW, slot, low, hit)
+            leave(slots_d, HIGH, slot, high, hit)
+            if any_hit:
+                leave(slots_i, CODE, slot, simd.i32(HIT), hit)
+                on = on & ~hit
+            else:
+                along = high - t_near
+                at_hit = along / (at(slots_d, Z, slot, hit) + along * at(slots_d, GZ, slot, hit))
+                cut = simd.to_f32(at_hit * at(slots_d, SCALE, slot, hit) * BEYOND)
+                # at_hit is negative behind the eye
+                sooner = hit & (at_hit >= 0.0)
+                end = at(slots_f, END, slot, sooner)
+                leave(slots_f, END, slot, simd.minimum(cut, end), sooner)
+        n_looks = append(looks, n_looks, slot, on)
+    return n_looks
+
+
+@kernel
+def walk(
+    many, slots_f, slots_i, slots_d, ready, looks, tests, prim_id, nearest, rest, planes,
+    shape, cells, bits, corners, max_steps, max_tests, any_hit,
+):  # fmt: skip
+    """March the rays of slots 0..many-1 to their ends; return the number of exact tests.
+
+    prim_id, nearest (H * W * K,), rest (H * W,); cells and bits: a pyramid and the two logarithms of
+    its size; ready, looks, tests: scratch (STRIDE,) int32.
+    """
+    for k in range(many):
+        ready[k] = k
+    n_ready, n_looks = many, 0
+    total = 0
+    while n_ready > 0 or n_looks > 0:
+        n_ready, n_looks = step(
+            ready, n_ready, looks, n_looks, n_looks > 0, slots_f, slots_i, shape, cells, bits,
+            max_steps,
+        )  # fmt: skip
+        n_ready, n_tests = look(
+            looks, n_looks, ready, n_ready, tests, slots_f, slots_i, prim_id, nearest, rest,
+            planes, shape, max_tests,
+        )  # fmt: skip
+        total += n_tests
+        n_looks = test(tests, n_tests, looks, slots_f, slots_i, slots_d, corners, any_hit)
+    return total
 
 
 @kernel
@@ -563,17 +600,17 @@ def write(many, slots_f, slots_i, slots_d, out):
     for k in range(0, many, W):
         live = simd.first(many - k)
         i = simd.load(slots_i, RAY * STRIDE + k)
-        s = simd.load(slots_f, R_S * STRIDE + k)
-        end = simd.load(slots_f, R_END * STRIDE + k)
-        code = simd.load(slots_i, R_CODE * STRIDE + k)
-        best = simd.load(slots_i, R_BEST * STRIDE + k)
+        s = simd.load(slots_f, S * STRIDE + k)
+        end = simd.load(slots_f, END * STRIDE + k)
+        code = simd.load(slots_i, CODE * STRIDE + k)
+        best = simd.load(slots_i, BEST * STRIDE + k)
         start = simd.load(slots_d, T_NEAR * STRIDE + k)
         stop = simd.load(slots_d, T_FAR * STRIDE + k)
         z = simd.load(slots_d, Z * STRIDE + k)
         gz = simd.load(slots_d, GZ * STRIDE + k)
         scale = simd.load(slots_d, SCALE * STRIDE + k)
-        low = simd.load(slots_d, R_LOW * STRIDE + k)
-        high = simd.load(slots_d, R_HIGH * STRIDE + k)
+        low = simd.load(slots_d, LOW * STRIDE + k)
+        high = simd.load(slots_d, HIGH * STRIDE + k)
         arrived = code == I(ARRIVED)
         along = high - start
         at_hit = along / (z + along * gz)
@@ -593,9 +630,9 @@ def write(many, slots_f, slots_i, slots_d, out):
         simd.scatter(prim_id, i, simd.select(hit, best, I(-1)), live)
         simd.scatter(t, i, simd.to_f32(middle), live)
         simd.scatter(t_free, i, simd.to_f32(free), live)
-        simd.scatter(steps, i, simd.load(slots_i, R_STEPS * STRIDE + k), live)
-        x = simd.select(hit, simd.load(slots_i, R_X * STRIDE + k), I(-1))
-        y = simd.select(hit, simd.load(slots_i, R_Y * STRIDE + k), I(-1))
+        simd.scatter(steps, i, simd.load(slots_i, STEPS * STRIDE + k), live)
+        x = simd.select(hit, simd.load(slots_i, BEST_X * STRIDE + k), I(-1))
+        y = simd.select(hit, simd.load(slots_i, BEST_Y * STRIDE + k), I(-1))
         simd.scatter(pixel, i + i, x, live)
         simd.scatter(pixel, i + i + I(1), y, live)
         simd.scatter(status, i, code, live)
@@ -605,7 +642,7 @@ def write(many, slots_f, slots_i, slots_d, out):
 @kernel
 def march_some(
     order, many, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits, corners,
-    max_steps, max_tests, any_hit, slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d, out,
+    max_steps, max_tests, any_hit, slots_f, slots_i, slots_d, ready, looks, tried, out,
 ):  # fmt: skip
     """March the rays order[:many]; return exact tests. order must have W more rows than are used."""
     status, resolved, pixel, prim_id_out, t, t_free, steps = out
@@ -625,7 +662,7 @@ def march_some(
                     unmarched(order[k + lane], how[lane], free[lane], out)
         if filled > BATCH - W or k + W >= many:
             tests += walk(
-                filled, slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d,
+                filled, slots_f, slots_i, slots_d, ready, looks, tried,
                 prim_id, nearest, rest, planes, shape, cells, bits, corners,
                 max_steps, max_tests, any_hit,
             )  # fmt: skip
@@ -667,9 +704,9 @@ def march(
         slots_f = np.zeros(F32_ROWS * STRIDE, np.float32)
         slots_i = np.zeros(I32_ROWS * STRIDE, np.int32)
         slots_d = np.zeros(F64_ROWS * STRIDE, np.float64)
-        lanes_f = np.zeros(LANE_F32 * W, np.float32)
-        lanes_i = np.zeros(LANE_I32 * W, np.int32)
-        lanes_d = np.zeros(LANE_F64 * W, np.float64)
+        ready = np.zeros(STRIDE, np.int32)
+        looks = np.zeros(STRIDE, np.int32)
+        tried = np.zeros(STRIDE, np.int32)
         order = np.zeros(CHUNK + W, np.int32)
         resolved = out[1]
         apart = GROUP // probes
@@ -683,7 +720,7 @@ def march(
             tests[worker] += march_some(
                 order, many, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits,
                 corners, max_steps, max_tests, any_hit,
-                slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d, out,
+                slots_f, slots_i, slots_d, ready, looks, tried, out,
             )  # fmt: skip
             many = 0
             for group in range(first, last, GROUP):
@@ -702,6 +739,6 @@ def march(
             tests[worker] += march_some(
                 order, many, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits,
                 corners, max_steps, max_tests, any_hit,
-                slots_f, slots_i, slots_d, lanes_f, lanes_i, lanes_d, out,
+                slots_f, slots_i, slots_d, ready, looks, tried, out,
             )  # fmt: skip
             first = fetch_add(taken.ctypes.data, CHUNK)
