@@ -1,18 +1,17 @@
-"""The certified march with a ray in every lane: the answers of `hybrid_rt.kernels.certified`.
+"""The certified march in vectors: the answers of `hybrid_rt.kernels.certified`.
 
-A *batch* of rays is set up into rows of plain arrays, *slots*; lanes walk them. In each turn of the
-loop all lanes that can take a step take it together. A lane that comes to a pixel with something in
-the ray's way waits until a few do, and then the next primitive of each is tested together. A lane
-whose ray has ended leaves its result in the slot and is given the next slot, once a few are free.
-At last the results of a batch are written to the rows of the outputs.
+A *batch* of rays is set up into rows of plain arrays, *slots*. Its rays then go from queue to
+queue: `step` walks what is ready, a ray in each lane, until something may be in the ray's way;
+`look` goes through the list of the pixel that it has come to; `test` intersects it with a
+primitive. Queues hold slots, so that each stage finds its lanes full, whatever other rays do. A lane of
+`step` whose ray has left is given the next one, once a few are free. At last the results of a batch
+are written to the rows of the outputs.
 
 Every lane computes what `hybrid_rt.kernels.certified` computes, operation by operation, so both
 have the same answers, ray for ray and step for step; there are the reasons and the error bounds.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from numba import prange
@@ -63,10 +62,11 @@ STRIDE = BATCH + W  # slots in a row: what is loaded past the last one is not us
 # Rows of slots, float32: the ray on the screen, its end and the s up to which it is free, by how
 # much its depth may be too low, its origin along the axes of the exact test.
 X0, Y0, Z0, SX, SY, SZ, INV_X, INV_Y, END, S, Z_ERROR, OX, OY, OZ, F32_ROWS = range(15)
-# int32: the ray, the axis kz of the exact test, how it ends if it meets nothing; then its state: the
-# pixel, level (or PASSED), steps, place in the pixel's list, the primitive tested last, exact tests,
-# best hit and its pixel, status or ARRIVED.
-RAY, KZ, HOW, CX, CY, LEVEL, STEPS, ENTRY, PRIM, TESTS, BEST, BEST_X, BEST_Y, CODE, I32_ROWS = range(15)
+# int32: the ray, the axis kz of the exact test, how it ends if it meets nothing; then its state:
+# the pixel, level (or PASSED), steps, place in the pixel's list, the primitive tested last, exact
+# tests, best hit and its pixel, status or ARRIVED.
+RAY, KZ, HOW, CX, CY, LEVEL, STEPS, ENTRY, PRIM, TESTS = range(10)
+BEST, BEST_X, BEST_Y, CODE, I32_ROWS = range(10, 15)
 # float64: what leads from s to t, limits, the shear of the exact test; bounds of the best hit's t.
 SCALE, Z, GZ, T_NEAR, T_FAR, SHEAR_X, SHEAR_Y, SHEAR_Z, LOW, HIGH, F64_ROWS = range(11)
 
@@ -75,8 +75,8 @@ PASSED = -1
 ARRIVED = -1
 """Result of a ray that has come to its end, or to its hit."""
 
-F = np.float32
-I = np.int32
+F32 = np.float32
+I32 = np.int32
 INFINITY = np.inf
 
 
@@ -106,28 +106,28 @@ def slope_of(delta):
     """Return (slope, 1 / slope) of an axis in float32, both 0 for tiny slopes."""
     slope = simd.to_f32(delta)
     tiny = simd.absolute(delta) < NO_SLOPE
-    return simd.select(tiny, F(0.0), slope), simd.select(tiny, F(0.0), F(1.0) / slope)
+    return simd.select(tiny, F32(0.0), slope), simd.select(tiny, F32(0.0), F32(1.0) / slope)
 
 
 @kernel
 def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_out, free_out):
     """Fill slots from `slot` on with the rays index (lanes) of `live` that can be walked.
 
-    Return their number. The statuses of the other rays go to how_out (W,) int32, -1 for walked ones,
-    and the t that they are free up to goes to free_out (W,) float32.
+    Return their number. The statuses of the other rays go to how_out (W,) int32, -1 for walked
+    ones, and the t that they are free up to goes to free_out (W,) float32.
     """
     origin, direction, t_nears, t_fars = rays
     width, height = size
     m, eye, near, spread, low, high = box
-    at = index * I(3)
-    ofx = simd.gather(origin, at, live, F(0.0))
-    ofy = simd.gather(origin, at + I(1), live, F(0.0))
-    ofz = simd.gather(origin, at + I(2), live, F(0.0))
-    dfx = simd.gather(direction, at, live, F(0.0))
-    dfy = simd.gather(direction, at + I(1), live, F(0.0))
-    dfz = simd.gather(direction, at + I(2), live, F(0.0))
-    start = simd.to_f64(simd.gather(t_nears, index, live, F(0.0)))
-    stop = simd.to_f64(simd.gather(t_fars, index, live, F(0.0)))
+    at = index * I32(3)
+    ofx = simd.gather(origin, at, live, F32(0.0))
+    ofy = simd.gather(origin, at + I32(1), live, F32(0.0))
+    ofz = simd.gather(origin, at + I32(2), live, F32(0.0))
+    dfx = simd.gather(direction, at, live, F32(0.0))
+    dfy = simd.gather(direction, at + I32(1), live, F32(0.0))
+    dfz = simd.gather(direction, at + I32(2), live, F32(0.0))
+    start = simd.to_f64(simd.gather(t_nears, index, live, F32(0.0)))
+    stop = simd.to_f64(simd.gather(t_fars, index, live, F32(0.0)))
     ox, oy, oz = simd.to_f64(ofx), simd.to_f64(ofy), simd.to_f64(ofz)
     dx, dy, dz = simd.to_f64(dfx), simd.to_f64(dfy), simd.to_f64(dfz)
 
@@ -149,11 +149,11 @@ def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_ou
     side = (simd.select(delta_x > 0.0, simd.f64(width), simd.f64(0.0)) - x) / delta_x
     sooner = (delta_x != 0.0) & (side < s_end)
     s_end = simd.select(sooner, side, s_end)
-    how = simd.select(sooner, I(OFFSCREEN), how)
+    how = simd.select(sooner, I32(OFFSCREEN), how)
     side = (simd.select(delta_y > 0.0, simd.f64(height), simd.f64(0.0)) - y) / delta_y
     sooner = (delta_y != 0.0) & (side < s_end)
     s_end = simd.select(sooner, side, s_end)
-    how = simd.select(sooner, I(OFFSCREEN), how)
+    how = simd.select(sooner, I32(OFFSCREEN), how)
 
     # clip_end
     t_exit = leave_axis(simd.f64(INFINITY), ox, dx, low[0], high[0])
@@ -163,7 +163,7 @@ def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_ou
     last = simd.minimum(t_exit, stop)
     s_last = (last - start) / (z + (last - start) * gz)
     drawn = (start <= last) & (last < INFINITY) & (s_last >= 0.0) & (s_last * BEYOND < s_end)
-    how = simd.select(drawn, I(MISS), how)
+    how = simd.select(drawn, I32(MISS), how)
     s_end = simd.select(drawn, simd.maximum(s_last, SHORTEST), s_end)
     nothing = last < start
 
@@ -179,12 +179,12 @@ def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_ou
 
     # How the others end.
     how_else = simd.select(nothing, simd.i32(MISS), simd.i32(UNDECIDED))
-    how_else = simd.select(placed, how_else, simd.select(in_front, simd.i32(OFFSCREEN), I(NEAR)))
-    how_else = simd.select(valid, how_else, I(INVALID))
-    simd.store(how_out, 0, simd.select(walks, I(-1), how_else))
+    how_else = simd.select(placed, how_else, simd.select(in_front, simd.i32(OFFSCREEN), I32(NEAR)))
+    how_else = simd.select(valid, how_else, I32(INVALID))
+    simd.store(how_out, 0, simd.select(walks, I32(-1), how_else))
     free = simd.to_f32(simd.minimum(start * (1.0 - 2.0**-22), stop))
-    free = simd.select(placed, free, F(0.0))
-    simd.store(free_out, 0, simd.select(how_else == I(MISS), simd.to_f32(stop), free))
+    free = simd.select(placed, free, F32(0.0))
+    simd.store(free_out, 0, simd.select(how_else == I32(MISS), simd.to_f32(stop), free))
 
     # The walk's float32 ray.
     scale = simd.maximum(simd.maximum(simd.absolute(delta_x), simd.absolute(delta_y)), 1.0 / s_end)
@@ -205,8 +205,8 @@ def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_ou
     put(slots_f, END, slot, simd.to_f32(s_end * scale * BEYOND), walks)
     put(slots_f, Z_ERROR, slot, simd.to_f32(HIGH_ULPS * U * highest), walks)
     put(slots_i, RAY, slot, index, walks)
-    cx = simd.minimum(simd.maximum(simd.to_i32(x0), I(0)), I(width - 1))
-    cy = simd.minimum(simd.maximum(simd.to_i32(y0), I(0)), I(height - 1))
+    cx = simd.minimum(simd.maximum(simd.to_i32(x0), I32(0)), I32(width - 1))
+    cy = simd.minimum(simd.maximum(simd.to_i32(y0), I32(0)), I32(height - 1))
     put(slots_i, CX, slot, cx, walks)
     put(slots_i, CY, slot, cy, walks)
     simd.store(slots_f, S * STRIDE + slot, simd.f32(0.0))
@@ -251,15 +251,15 @@ def put(rows, row, slot, v, m):
 def edge_at(cell, level, start, inv):
     """Return the s at which lanes reach an edge of a cell; infinity where they never do."""
     at = (simd.to_f32(cell << level) - start) * inv
-    return simd.select(inv == F(0.0), F(INFINITY), at)
+    return simd.select(inv == F32(0.0), F32(INFINITY), at)
 
 
 @inlined
 def corner(corners, at, kx, ky, kz, ox, oy, oz, m):
     """Return a vertex of triangles relative to the rays' origins, along their axes."""
-    z = simd.to_f64(simd.gather(corners, at + kz, m, F(0.0))) - oz
-    x = simd.to_f64(simd.gather(corners, at + kx, m, F(0.0))) - ox
-    y = simd.to_f64(simd.gather(corners, at + ky, m, F(0.0))) - oy
+    z = simd.to_f64(simd.gather(corners, at + kz, m, F32(0.0))) - oz
+    x = simd.to_f64(simd.gather(corners, at + kx, m, F32(0.0))) - ox
+    y = simd.to_f64(simd.gather(corners, at + ky, m, F32(0.0))) - oy
     return x, y, z
 
 
@@ -275,16 +275,16 @@ def test_primitives(prim, m, corners, kz, ox, oy, oz, shear_x, shear_y, shear_z,
 
     As `hybrid_rt.kernels.certified.test_primitive`. corners (F * 9,) float32.
     """
-    kx = simd.select(kz == I(2), simd.i32(0), kz + I(1))
-    ky = simd.select(kx == I(2), simd.i32(0), kx + I(1))
-    at = prim * I(9)
+    kx = simd.select(kz == I32(2), simd.i32(0), kz + I32(1))
+    ky = simd.select(kx == I32(2), simd.i32(0), kx + I32(1))
+    at = prim * I32(9)
     x, y, z = corner(corners, at, kx, ky, kz, ox, oy, oz, m)
     r = largest(x, y, z)
     ax, ay, at_ = x - shear_x * z, y - shear_y * z, shear_z * z
-    x, y, z = corner(corners, at + I(3), kx, ky, kz, ox, oy, oz, m)
+    x, y, z = corner(corners, at + I32(3), kx, ky, kz, ox, oy, oz, m)
     r = simd.maximum(r, largest(x, y, z))
     bx, by, bt = x - shear_x * z, y - shear_y * z, shear_z * z
-    x, y, z = corner(corners, at + I(6), kx, ky, kz, ox, oy, oz, m)
+    x, y, z = corner(corners, at + I32(6), kx, ky, kz, ox, oy, oz, m)
     r = simd.maximum(r, largest(x, y, z))
     cx, cy, ct = x - shear_x * z, y - shear_y * z, shear_z * z
 
@@ -315,13 +315,13 @@ def test_primitives(prim, m, corners, kz, ox, oy, oz, shear_x, shear_y, shear_z,
 @inlined
 def at(rows, row, slot, m):
     """Return a row at the slots of lanes m."""
-    return simd.gather(rows, slot + I(row * STRIDE), m, 0)
+    return simd.gather(rows, slot + I32(row * STRIDE), m, 0)
 
 
 @inlined
 def leave(rows, row, slot, v, m):
     """Write lanes m to their slots of a row."""
-    simd.scatter(rows, slot + I(row * STRIDE), v, m)
+    simd.scatter(rows, slot + I32(row * STRIDE), v, m)
 
 
 @inlined
@@ -335,12 +335,12 @@ def append(queue, many, slot, m):
 def step(
     ready, n_ready, looks, n_looks, more, slots_f, slots_i, shape, cells, bits, max_steps
 ):  # fmt: skip
-    """Walk the rays of `ready` until they end or something may be in their way; those go to `looks`.
+    """Walk the rays of `ready` until they end or, going to `looks`, something may be in their way.
 
     With `more` (others wait) a few that are still on their way may be left in `ready`. Return how
     many are in both queues.
     """
-    width, height, length, top = shape
+    width, height, _, top = shape
     row_bits, column_bits = bits
     none = simd.mask(False)
     zero = simd.f32(0.0)
@@ -373,48 +373,48 @@ def step(
                 return 0, n_looks
             stopped, ended = none, none
             fresh = ~active
-            fresh = fresh & (simd.expand(simd.iota(), fresh, I(W)) < I(min(n_ready - taken, W)))
+            fresh = fresh & (simd.expand(simd.iota(), fresh, I32(W)) < I32(min(n_ready - taken, W)))
             slot = simd.expand(simd.load(ready, taken), fresh, slot)
             taken += simd.count(fresh)
-            x0 = simd.gather(slots_f, slot + I(X0 * STRIDE), fresh, x0)
-            y0 = simd.gather(slots_f, slot + I(Y0 * STRIDE), fresh, y0)
-            z0 = simd.gather(slots_f, slot + I(Z0 * STRIDE), fresh, z0)
-            sx = simd.gather(slots_f, slot + I(SX * STRIDE), fresh, sx)
-            sy = simd.gather(slots_f, slot + I(SY * STRIDE), fresh, sy)
-            sz = simd.gather(slots_f, slot + I(SZ * STRIDE), fresh, sz)
-            inv_x = simd.gather(slots_f, slot + I(INV_X * STRIDE), fresh, inv_x)
-            inv_y = simd.gather(slots_f, slot + I(INV_Y * STRIDE), fresh, inv_y)
-            end = simd.gather(slots_f, slot + I(END * STRIDE), fresh, end)
-            s = simd.gather(slots_f, slot + I(S * STRIDE), fresh, s)
-            cx = simd.gather(slots_i, slot + I(CX * STRIDE), fresh, cx)
-            cy = simd.gather(slots_i, slot + I(CY * STRIDE), fresh, cy)
-            level = simd.gather(slots_i, slot + I(LEVEL * STRIDE), fresh, level)
-            steps = simd.gather(slots_i, slot + I(STEPS * STRIDE), fresh, steps)
-            code = simd.select(fresh, I(ARRIVED), code)
-            passed = fresh & (level == I(PASSED))
-            level = simd.select(passed, I(0), level)
+            x0 = simd.gather(slots_f, slot + I32(X0 * STRIDE), fresh, x0)
+            y0 = simd.gather(slots_f, slot + I32(Y0 * STRIDE), fresh, y0)
+            z0 = simd.gather(slots_f, slot + I32(Z0 * STRIDE), fresh, z0)
+            sx = simd.gather(slots_f, slot + I32(SX * STRIDE), fresh, sx)
+            sy = simd.gather(slots_f, slot + I32(SY * STRIDE), fresh, sy)
+            sz = simd.gather(slots_f, slot + I32(SZ * STRIDE), fresh, sz)
+            inv_x = simd.gather(slots_f, slot + I32(INV_X * STRIDE), fresh, inv_x)
+            inv_y = simd.gather(slots_f, slot + I32(INV_Y * STRIDE), fresh, inv_y)
+            end = simd.gather(slots_f, slot + I32(END * STRIDE), fresh, end)
+            s = simd.gather(slots_f, slot + I32(S * STRIDE), fresh, s)
+            cx = simd.gather(slots_i, slot + I32(CX * STRIDE), fresh, cx)
+            cy = simd.gather(slots_i, slot + I32(CY * STRIDE), fresh, cy)
+            level = simd.gather(slots_i, slot + I32(LEVEL * STRIDE), fresh, level)
+            steps = simd.gather(slots_i, slot + I32(STEPS * STRIDE), fresh, steps)
+            code = simd.select(fresh, I32(ARRIVED), code)
+            passed = fresh & (level == I32(PASSED))
+            level = simd.select(passed, I32(0), level)
             active = active | fresh
         lx, ly = cx >> level, cy >> level
-        right, down = sx > F(0.0), sy > F(0.0)
+        right, down = sx > F32(0.0), sy > F32(0.0)
         at_x = edge_at(lx + simd.to_i32(right), level, x0, inv_x)
         at_y = edge_at(ly + simd.to_i32(down), level, y0, inv_y)
         s_exit = simd.maximum(simd.minimum(simd.minimum(at_x, at_y), end), s)
         new = active & ~passed
-        tired = new & (steps == I(max_steps))
-        code = simd.select(tired, I(EXHAUSTED), code)
+        tired = new & (steps == I32(max_steps))
+        code = simd.select(tired, I32(EXHAUSTED), code)
         ended = ended | tired
         active = active & ~tired
         new = new & ~tired
-        steps = simd.select(new, steps + I(1), steps)
+        steps = simd.select(new, steps + I32(1), steps)
         size = simd.i32(row_bits + column_bits) - (level + level)
         cell = (simd.i32(1) << size) + (ly << (simd.i32(column_bits) - level)) + lx
-        near = simd.gather(cells, cell, new, F(0.0))
-        lowest = z0 + sz * simd.select(sz < F(0.0), s_exit, s)
-        blocked = new & (near > F(0.0)) & ~(lowest > near)
-        stops = blocked & (level == I(0))
+        near = simd.gather(cells, cell, new, F32(0.0))
+        lowest = z0 + sz * simd.select(sz < F32(0.0), s_exit, s)
+        blocked = new & (near > F32(0.0)) & ~(lowest > near)
+        stops = blocked & (level == I32(0))
         stopped = stopped | stops
         active = active & ~stops
-        level = simd.select(blocked & ~stops, level - I(1), level)
+        level = simd.select(blocked & ~stops, level - I32(1), level)
         free = active & ~blocked
         passed = none
         s = simd.select(free, s_exit, s)
@@ -422,24 +422,24 @@ def step(
         go = free & ~arrived
         across = at_x < at_y
         left_x, left_y = lx << level, ly << level
-        last_x = left_x + (simd.i32(1) << level) - I(1)
-        last_y = left_y + (simd.i32(1) << level) - I(1)
+        last_x = left_x + (simd.i32(1) << level) - I32(1)
+        last_y = left_y + (simd.i32(1) << level) - I32(1)
         next_x = simd.maximum(simd.to_i32(x0 + sx * s), simd.select(right, cx, left_x))
-        next_x = simd.minimum(next_x, simd.select(sx < F(0.0), cx, last_x))
+        next_x = simd.minimum(next_x, simd.select(sx < F32(0.0), cx, last_x))
         next_y = simd.maximum(simd.to_i32(y0 + sy * s), simd.select(down, cy, left_y))
-        next_y = simd.minimum(next_y, simd.select(sy < F(0.0), cy, last_y))
-        beyond_x = simd.select(right, last_x + I(1), left_x - I(1))
-        beyond_y = simd.select(down, last_y + I(1), left_y - I(1))
+        next_y = simd.minimum(next_y, simd.select(sy < F32(0.0), cy, last_y))
+        beyond_x = simd.select(right, last_x + I32(1), left_x - I32(1))
+        beyond_y = simd.select(down, last_y + I32(1), left_y - I32(1))
         cx = simd.select(go, simd.select(across, beyond_x, next_x), cx)
         cy = simd.select(go, simd.select(across, next_y, beyond_y), cy)
-        off = go & ((cx < I(0)) | (cy < I(0)) | (cx >= I(width)) | (cy >= I(height)))
-        code = simd.select(off, I(OFFSCREEN), code)
+        off = go & ((cx < I32(0)) | (cy < I32(0)) | (cx >= I32(width)) | (cy >= I32(height)))
+        code = simd.select(off, I32(OFFSCREEN), code)
         gone = arrived | off
         ended = ended | gone
         active = active & ~gone
-        up = level + I(1)
-        other = ((cx >> up) != (lx >> I(1))) | ((cy >> up) != (ly >> I(1)))
-        level = simd.select(go & other & (level < I(top)), up, level)
+        up = level + I32(1)
+        other = ((cx >> up) != (lx >> I32(1))) | ((cy >> up) != (ly >> I32(1)))
+        level = simd.select(go & other & (level < I32(top)), up, level)
 
 
 @kernel
@@ -449,56 +449,58 @@ def look(
 ):  # fmt: skip
     """Go through the lists of the pixels that the rays of `looks` have come to.
 
-    A ray goes to `tests` with a primitive that it may hit, back to `ready` if there is none left, or
-    ends. Return how many are in these two queues.
+    A ray goes to `tests` with a primitive that it may hit, back to `ready` if there is none left,
+    or ends. Return how many are in these two queues.
     """
-    width, height, length, top = shape
+    width, _, length, _ = shape
     n_tests = 0
     for k in range(0, n_looks, W):
         live = simd.first(n_looks - k)
         slot = simd.load(looks, k)
-        slot = simd.select(live, slot, I(0))
-        x0, y0, z0 = at(slots_f, X0, slot, live), at(slots_f, Y0, slot, live), at(slots_f, Z0, slot, live)
-        sx, sy, sz = at(slots_f, SX, slot, live), at(slots_f, SY, slot, live), at(slots_f, SZ, slot, live)
+        slot = simd.select(live, slot, I32(0))
+        x0, y0 = at(slots_f, X0, slot, live), at(slots_f, Y0, slot, live)
+        sx, sy = at(slots_f, SX, slot, live), at(slots_f, SY, slot, live)
+        z0, sz = at(slots_f, Z0, slot, live), at(slots_f, SZ, slot, live)
+        inv_x, inv_y = at(slots_f, INV_X, slot, live), at(slots_f, INV_Y, slot, live)
         s, end = at(slots_f, S, slot, live), at(slots_f, END, slot, live)
         cx, cy = at(slots_i, CX, slot, live), at(slots_i, CY, slot, live)
         entry = at(slots_i, ENTRY, slot, live)
         prim, best = at(slots_i, PRIM, slot, live), at(slots_i, BEST, slot, live)
-        at_x = edge_at(cx + simd.to_i32(sx > F(0.0)), simd.i32(0), x0, at(slots_f, INV_X, slot, live))
-        at_y = edge_at(cy + simd.to_i32(sy > F(0.0)), simd.i32(0), y0, at(slots_f, INV_Y, slot, live))
+        at_x = edge_at(cx + simd.to_i32(sx > F32(0.0)), simd.i32(0), x0, inv_x)
+        at_y = edge_at(cy + simd.to_i32(sy > F32(0.0)), simd.i32(0), y0, inv_y)
         s_exit = simd.maximum(simd.minimum(simd.minimum(at_x, at_y), end), s)
         z_in, z_out = z0 + sz * s, z0 + sz * s_exit
         x_in, y_in, x_out, y_out = x0 + sx * s, y0 + sy * s, x0 + sx * s_exit, y0 + sy * s_exit
         z_error = at(slots_f, Z_ERROR, slot, live)
-        lowest = simd.select(sz < F(0.0), z_out, z_in)
-        pixel = cy * I(width) + cx
+        lowest = simd.select(sz < F32(0.0), z_out, z_in)
+        pixel = cy * I32(width) + cx
         seek = live
         past = simd.mask(False)
         found = prim
         while simd.any_(seek):
-            full = seek & (entry == I(length))
+            full = seek & (entry == I32(length))
             if simd.any_(full):
-                others = simd.gather(rest, pixel, full, F(0.0))
+                others = simd.gather(rest, pixel, full, F32(0.0))
                 hidden = full & ~(lowest > others)
                 leave(slots_i, CODE, slot, simd.i32(HIDDEN), hidden)
                 past = past | (full & ~hidden)
                 seek = seek & ~full
-            place = pixel * I(length) + entry
+            place = pixel * I32(length) + entry
             found = simd.gather(prim_id, place, seek, found)
-            bound = simd.gather(nearest, place, seek, F(0.0))
-            beyond = seek & ((found < I(0)) | (bound < lowest))
+            bound = simd.gather(nearest, place, seek, F32(0.0))
+            beyond = seek & ((found < I32(0)) | (bound < lowest))
             past = past | beyond
             seek = seek & ~beyond
-            entry = simd.select(seek, entry + I(1), entry)
+            entry = simd.select(seek, entry + I32(1), entry)
             there = seek & (found != prim) & (found != best)
             if simd.any_(there):
-                row = found * I(PLANE_ROW)
-                a = simd.gather(planes, row + I(SLOPE_X), there, F(0.0))
-                b = simd.gather(planes, row + I(SLOPE_Y), there, F(0.0))
-                c = simd.gather(planes, row + I(DEPTH), there, F(0.0))
-                px = simd.gather(planes, row + I(REFERENCE_X), there, F(0.0))
-                py = simd.gather(planes, row + I(REFERENCE_Y), there, F(0.0))
-                error = simd.gather(planes, row + I(ERROR), there, F(0.0))
+                row = found * I32(PLANE_ROW)
+                a = simd.gather(planes, row + I32(SLOPE_X), there, F32(0.0))
+                b = simd.gather(planes, row + I32(SLOPE_Y), there, F32(0.0))
+                c = simd.gather(planes, row + I32(DEPTH), there, F32(0.0))
+                px = simd.gather(planes, row + I32(REFERENCE_X), there, F32(0.0))
+                py = simd.gather(planes, row + I32(REFERENCE_Y), there, F32(0.0))
+                error = simd.gather(planes, row + I32(ERROR), there, F32(0.0))
                 above = z_in - (c + a * (x_in - px) + b * (y_in - py))
                 then = z_out - (c + a * (x_out - px) + b * (y_out - py))
                 front = simd.minimum(above, then) > error
@@ -507,10 +509,10 @@ def look(
                 if simd.any_(there):
                     seek = seek & ~there
                     done = at(slots_i, TESTS, slot, there)
-                    tired = there & (done == I(max_tests))
+                    tired = there & (done == I32(max_tests))
                     leave(slots_i, CODE, slot, simd.i32(EXHAUSTED), tired)
                     there = there & ~tired
-                    leave(slots_i, TESTS, slot, done + I(1), there)
+                    leave(slots_i, TESTS, slot, done + I32(1), there)
                     leave(slots_i, PRIM, slot, found, there)
                     leave(slots_i, ENTRY, slot, entry, there)
                     n_tests = append(tests, n_tests, slot, there)
@@ -528,7 +530,7 @@ def test(tests, n_tests, looks, slots_f, slots_i, slots_d, corners, any_hit):
     n_looks = 0
     for k in range(0, n_tests, W):
         live = simd.first(n_tests - k)
-        slot = simd.select(live, simd.load(tests, k), I(0))
+        slot = simd.select(live, simd.load(tests, k), I32(0))
         prim, best = at(slots_i, PRIM, slot, live), at(slots_i, BEST, slot, live)
         t_near = at(slots_d, T_NEAR, slot, live)
         missed, hit, low, high = test_primitives(
@@ -539,7 +541,7 @@ def test(tests, n_tests, looks, slots_f, slots_i, slots_d, corners, any_hit):
             t_near, at(slots_d, HIGH, slot, live),
         )  # fmt: skip
         # A hit that rounding may put before or after the best one is a tie.
-        tie = (best >= I(0)) & (high >= at(slots_d, LOW, slot, live))
+        tie = (best >= I32(0)) & (high >= at(slots_d, LOW, slot, live))
         unsure = live & ~missed & (~hit | tie)
         leave(slots_i, CODE, slot, simd.i32(UNDECIDED), unsure)
         on = live & ~unsure
@@ -572,8 +574,8 @@ def walk(
 ):  # fmt: skip
     """March the rays of slots 0..many-1 to their ends; return the number of exact tests.
 
-    prim_id, nearest (H * W * K,), rest (H * W,); cells and bits: a pyramid and the two logarithms of
-    its size; ready, looks, tests: scratch (STRIDE,) int32.
+    prim_id, nearest (H * W * K,), rest (H * W,); cells and bits: a pyramid and the two logarithms
+    of its size; ready, looks, tests: scratch (STRIDE,) int32.
     """
     for k in range(many):
         ready[k] = k
@@ -611,30 +613,30 @@ def write(many, slots_f, slots_i, slots_d, out):
         scale = simd.load(slots_d, SCALE * STRIDE + k)
         low = simd.load(slots_d, LOW * STRIDE + k)
         high = simd.load(slots_d, HIGH * STRIDE + k)
-        arrived = code == I(ARRIVED)
+        arrived = code == I32(ARRIVED)
         along = high - start
         at_hit = along / (z + along * gz)
-        found = best >= I(0)
+        found = best >= I32(0)
         reached = found & (at_hit >= 0.0) & (simd.to_f32(at_hit * scale * BEYOND) <= end)
         how = simd.load(slots_i, HOW * STRIDE + k)
-        how = simd.select(found & (how == I(MISS)), I(UNDECIDED), how)
-        code = simd.select(arrived, simd.select(reached, I(HIT), how), code)
-        hit = code == I(HIT)
-        miss = code == I(MISS)
+        how = simd.select(found & (how == I32(MISS)), I32(UNDECIDED), how)
+        code = simd.select(arrived, simd.select(reached, I32(HIT), how), code)
+        hit = code == I32(HIT)
+        miss = code == I32(MISS)
         # ray_t, rounded down: what is proven is proven up to here at least.
         s_free = simd.to_f64(s) / scale / BEYOND
         below = 1.0 - s_free * gz
         free = simd.select(below <= 0.0, INFINITY, start + s_free * z / below)
         free = simd.select(miss, stop, simd.minimum(free * (1.0 - 2.0**-22), stop))
         middle = simd.select(hit, 0.5 * (low + high), INFINITY)
-        simd.scatter(prim_id, i, simd.select(hit, best, I(-1)), live)
+        simd.scatter(prim_id, i, simd.select(hit, best, I32(-1)), live)
         simd.scatter(t, i, simd.to_f32(middle), live)
         simd.scatter(t_free, i, simd.to_f32(free), live)
         simd.scatter(steps, i, simd.load(slots_i, STEPS * STRIDE + k), live)
-        x = simd.select(hit, simd.load(slots_i, BEST_X * STRIDE + k), I(-1))
-        y = simd.select(hit, simd.load(slots_i, BEST_Y * STRIDE + k), I(-1))
+        x = simd.select(hit, simd.load(slots_i, BEST_X * STRIDE + k), I32(-1))
+        y = simd.select(hit, simd.load(slots_i, BEST_Y * STRIDE + k), I32(-1))
         simd.scatter(pixel, i + i, x, live)
-        simd.scatter(pixel, i + i + I(1), y, live)
+        simd.scatter(pixel, i + i + I32(1), y, live)
         simd.scatter(status, i, code, live)
         simd.scatter(resolved, i, hit | miss, live)
 
@@ -644,8 +646,7 @@ def march_some(
     order, many, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits, corners,
     max_steps, max_tests, any_hit, slots_f, slots_i, slots_d, ready, looks, tried, out,
 ):  # fmt: skip
-    """March the rays order[:many]; return exact tests. order must have W more rows than are used."""
-    status, resolved, pixel, prim_id_out, t, t_free, steps = out
+    """March the rays order[:many]; return exact tests. `order` has W more rows than are used."""
     how = np.empty(W, np.int32)
     free = np.empty(W, np.float32)
     tests = 0
@@ -735,7 +736,7 @@ def march(
                         order[many] = i
                         many += 1
                     else:
-                        unmarched(i, SKIPPED, F(0.0), out)
+                        unmarched(i, SKIPPED, F32(0.0), out)
             tests[worker] += march_some(
                 order, many, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits,
                 corners, max_steps, max_tests, any_hit,

@@ -58,7 +58,7 @@ from .lanewise import (
     to_i64,
 )
 from .make import f32, f64, first, i32, i64, iota, mask, mask_of_bits
-from .memory import gather, load, load_masked, prefetch, scatter, store, store_masked
+from .memory import gather, load, load_masked, scatter, store, store_masked
 from .packing import compress, expand
 
 __all__ = [
@@ -92,7 +92,6 @@ __all__ = [
     "mask_of_bits",
     "maximum",
     "minimum",
-    "prefetch",
     "reduce_add",
     "reduce_max",
     "reduce_min",

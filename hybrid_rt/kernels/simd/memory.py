@@ -188,25 +188,3 @@ def scatter(typingctx, arr, idx, v, m):
         return context.get_dummy_value()
 
     return types.none(arr, idx, v, m), generate
-
-
-@intrinsic
-def prefetch(typingctx, arr, idx, m):
-    """Ask for the cache lines of arr.flat[idx] in the lanes of m, before they are needed."""
-    _, element = _element_of("prefetch", arr)
-    need("prefetch", "idx", idx, "i32", "i64")
-    need("prefetch", "m", m, "mask")
-
-    def generate(context, builder, sig, args):
-        base = _pointer(context, builder, sig.args[0], args[0])
-        zero = ir.Constant(args[1].type, None)
-        index = builder.select(args[2], args[1], zero)
-        byte = ir.IntType(8).as_pointer()
-        for k in range(m.lanes):
-            lane = builder.sext(builder.extract_element(index, ir.Constant(I32, k)), ir.IntType(64))
-            address = builder.bitcast(builder.gep(base, [lane]), byte)
-            flags = [ir.Constant(I32, n) for n in (0, 3, 1)]  # read, keep in all caches, data
-            call(builder, "llvm.prefetch.p0", ir.VoidType(), [address, *flags])
-        return context.get_dummy_value()
-
-    return types.none(arr, idx, m), generate
