@@ -59,7 +59,7 @@ def march(
             lists.planes,
             pyramid.data,
             pyramid.offsets,
-            pyramid.widths,
+            pyramid.pitches,
             scene.vertices,
             scene.faces,
             m,

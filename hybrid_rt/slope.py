@@ -31,7 +31,7 @@ def march(
             gbuffer.prim_id,
             pyramid.data,
             pyramid.offsets,
-            pyramid.widths,
+            pyramid.pitches,
             gbuffer.camera.pixel_from_world,
             np.array(gbuffer.camera.eye),
             gbuffer.camera.near,

@@ -363,11 +363,14 @@ class DepthPyramid:
 
     Attributes
     ----------
-    data : (sum of all cells,) float32
-        All levels, row by row, one after the other.
+    data : (cells,) float32
+        All levels, row by row, each padded to powers of two; see `hybrid_rt.pyramid.layout`.
     offsets : (L,) int64
         Index of the first cell of each level in `data`.
+    pitches : (L,) int64
+        Cells from the start of a row of a level to the start of the next.
     widths, heights : (L,) int64
+        Cells of a level without its padding.
     conservative : bool
         Whether the depths are those of pixel squares (the first bounds of `PrimitiveLists`) and
         not those of pixel centres.
@@ -375,6 +378,7 @@ class DepthPyramid:
 
     data: F32
     offsets: I64
+    pitches: I64
     widths: I64
     heights: I64
     conservative: bool = False
@@ -385,8 +389,7 @@ class DepthPyramid:
     def level(self, index: int) -> F32:
         """Return level `index` as a (height, width) view of `data`."""
         n = _check.integer("index", index, least=0, most=len(self) - 1)
-        start, w, h = int(self.offsets[n]), int(self.widths[n]), int(self.heights[n])
-        return self.data[start : start + w * h].reshape(h, w)
+        return _level(self, n)
 
 
 @dataclass(frozen=True, eq=False)
@@ -400,15 +403,15 @@ class SlopePyramid:
 
     Attributes
     ----------
-    data : (sum of all cells, 3) float32
-        a, b_x, b_y, in depth and depth a pixel; all levels, row by row, one after the other.
-    offsets : (L,) int64
-        Index of the first cell of each level in `data`.
-    widths, heights : (L,) int64
+    data : (cells, 3) float32
+        a, b_x, b_y, in depth and depth a pixel; the levels lie as in a DepthPyramid.
+    offsets, pitches, widths, heights : (L,) int64
+        As in a DepthPyramid.
     """
 
     data: F32
     offsets: I64
+    pitches: I64
     widths: I64
     heights: I64
 
@@ -418,12 +421,19 @@ class SlopePyramid:
     def level(self, index: int) -> F32:
         """Return level `index` as a (height, width, 3) view of `data`."""
         n = _check.integer("index", index, least=0, most=len(self) - 1)
-        start, w, h = int(self.offsets[n]), int(self.widths[n]), int(self.heights[n])
-        return self.data[start : start + w * h].reshape(h, w, 3)
+        return _level(self, n)
 
 
 Pyramid = DepthPyramid | SlopePyramid
 """What a march goes through."""
+
+
+def _level(pyramid: Pyramid, n: int) -> F32:
+    """Return level n, (height, width, ...), as a view without its padding."""
+    start, pitch = int(pyramid.offsets[n]), int(pyramid.pitches[n])
+    height, width = int(pyramid.heights[n]), int(pyramid.widths[n])
+    rows = pyramid.data[start : start + height * pitch]
+    return rows.reshape(height, pitch, *pyramid.data.shape[1:])[:, :width]
 
 
 @dataclass(frozen=True, eq=False)
