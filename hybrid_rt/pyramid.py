@@ -56,7 +56,7 @@ def build_depth_pyramid(
         depth = np.ascontiguousarray(gbuffer.lists.nearest[:, :, 0])
     height, width = depth.shape
     cells, levels = layout(width, height)
-    data = np.zeros(cells, np.float32)  # padding costs no time: its pages are never touched
+    data = np.empty(cells, np.float32)
     with _threads.limited(threads):
         kernels.build(depth, *levels, data)
     return DepthPyramid(data, *levels, conservative)
@@ -68,17 +68,18 @@ def bits(width: int, height: int) -> tuple[int, int]:
 
 
 def layout(width: int, height: int) -> tuple[int, tuple[I64, I64, I64, I64]]:
-    """Return the number of cells, padding included, and where the levels of a pyramid lie.
+    """Return how many cells to make room for and where the levels of a pyramid lie.
 
     The levels are given by their offsets, pitches, widths and heights, (L,) int64 each. A level is
     padded to powers of two and begins at its own size, so that what is left below holds all coarser
     levels, and a kernel can compute a cell's place from the level alone:
     ``2**(a + b - 2 l) + (y << (a - l)) + x``, with a, b = `bits`, up to the level l = min(a, b) at
-    which the shorter axis is one cell. A cell is looked up only for a pixel of the image, so nothing
-    reads the padding, which is 0.
+    which the shorter axis is one cell. The padding is never written: the cell of a pixel of the
+    image is never in it, and no march looks up a cell before it knows that its pixel is one.
     """
     a, b = bits(width, height)
     level = np.arange(max(a, b) + 1)
     columns, rows = np.maximum(a - level, 0), np.maximum(b - level, 0)
     widths, heights = -(-width >> level), -(-height >> level)
-    return 2 << (a + b), (1 << (columns + rows), 1 << columns, widths, heights)
+    offsets, pitches = 1 << (columns + rows), 1 << columns
+    return int(offsets[0] + pitches[0] * height), (offsets, pitches, widths, heights)

@@ -41,7 +41,7 @@ def build_slope_pyramid(gbuffer: GBuffer, *, threads: int | None = None) -> Slop
     _check.instance("gbuffer", gbuffer, GBuffer)
     height, width = gbuffer.depth.shape
     cells, levels = layout(width, height)
-    data = np.zeros((cells, 3), np.float32)
+    data = np.empty((cells, 3), np.float32)
     with _threads.limited(threads):
         kernels.build(gbuffer.depth, gbuffer.ddx, gbuffer.ddy, *levels, data)
     return SlopePyramid(data, *levels)

@@ -151,6 +151,11 @@ class Scene:
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
     @cached_property
+    def corners(self) -> F32:
+        """(F, 9) float32, world: the three vertices of each triangle, side by side, 36 bytes."""
+        return self.vertices[self.faces].reshape(-1, 9)
+
+    @cached_property
     def diagonal(self) -> float:
         """Length of the bounding box's diagonal, world units: what a scene's lengths relate to."""
         low, high = self.bounds
@@ -602,6 +607,8 @@ class MarchStatus(enum.IntEnum):
     """NaN, an infinity or a zero direction."""
     UNDECIDED = 7
     """Certified only: two hits, or a hit and a miss, are closer than float64 can tell apart."""
+    SKIPPED = 8
+    """Certified only: not marched, since no probe near it in the order of the rays was resolved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -625,8 +632,8 @@ class Marched:
         Up to here the march found the ray in front of everything that it read.
     steps : (N,) int32
         Samples of the pyramid that the ray took.
-    steps_by_level : (L,) int64
-        The same, summed over the rays, for each level.
+    steps_by_level : (L,) int64, optional
+        The same, summed over the rays, for each level; None where it was not counted.
     tests : int
         Exact tests of a ray against a primitive, over all rays; only mode "certified" makes any.
     """
@@ -638,11 +645,11 @@ class Marched:
     t: F32
     t_free: F32
     steps: I32
-    steps_by_level: I64
+    steps_by_level: I64 | None = None
     tests: int = 0
 
     @classmethod
-    def unfilled(cls, n: int, levels: int) -> Marched:
+    def unfilled(cls, n: int) -> Marched:
         """Return room for `n` rays, with nothing in it yet, for code that writes every row."""
         return cls(
             np.empty(n, np.uint8),
@@ -652,7 +659,6 @@ class Marched:
             np.empty(n, np.float32),
             np.empty(n, np.float32),
             np.empty(n, np.int32),
-            np.empty(levels, np.int64),
         )
 
     @property

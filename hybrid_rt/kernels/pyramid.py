@@ -14,8 +14,8 @@ BAND_LEVELS = 4
 def reduce_rows(data, source, pitch, width, height, target, wide_pitch, first, last):
     """Make rows first..last-1 of a level at `target` from the level (height, width) at `source`.
 
-    Both are offsets into data (cells,) float32, with rows `pitch` and `wide_pitch` apart. A child beyond the last row or column stands for
-    the last one.
+    Both are offsets into data (cells,) float32, with rows `pitch` and `wide_pitch` apart. A child
+    beyond the last row or column stands for the last one.
     """
     half = width >> 1
     wide = (width + 1) >> 1
@@ -35,8 +35,8 @@ def reduce_rows(data, source, pitch, width, height, target, wide_pitch, first, l
 def build(depth, offsets, pitches, widths, heights, data):
     """Fill data (cells,) float32 with all levels of depth (H, W) float32; level 0 is a copy.
 
-    offsets, pitches, widths, heights (L,) int64. Each band of rows goes up as far as it stays whole while it
-    is in the cache; what is left above is small and is done at the end.
+    offsets, pitches, widths, heights (L,) int64. Each band of rows goes up as far as it stays whole
+    while it is in the cache; what is left above is small and is done at the end.
     """
     levels = len(offsets)
     low = min(BAND_LEVELS, levels - 1)

@@ -51,14 +51,15 @@ def test_levels_lie_where_the_closed_form_says_and_apart(width, height, build):
         np.add.at(owners, places, 1)
     assert owners.max() == 1
     assert pyramid.level(len(pyramid) - 1).shape[:2] == (1, 1)
-    assert not pyramid.data[owners == 0].any()
 
 
 def test_threads_change_nothing_and_the_input_stays():
     depth = np.random.default_rng(1).random((301, 203), dtype=np.float32)
     before = depth.copy()
     one = hrt.build_depth_pyramid(gbuffer_of(depth), threads=1)
-    assert np.array_equal(one.data, hrt.build_depth_pyramid(gbuffer_of(depth)).data)
+    all_ = hrt.build_depth_pyramid(gbuffer_of(depth))
+    for index in range(len(one)):
+        assert np.array_equal(one.level(index), all_.level(index))
     assert np.array_equal(depth, before)
 
 

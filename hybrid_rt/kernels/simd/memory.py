@@ -193,7 +193,7 @@ def scatter(typingctx, arr, idx, v, m):
 @intrinsic
 def prefetch(typingctx, arr, idx, m):
     """Ask for the cache lines of arr.flat[idx] in the lanes of m, before they are needed."""
-    _, element = _element_of("prefetch", arr)
+    _element_of("prefetch", arr)
     need("prefetch", "idx", idx, "i32", "i64")
     need("prefetch", "m", m, "mask")
 
