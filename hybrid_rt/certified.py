@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid_rt import _threads
 from hybrid_rt.kernels import certified as kernels
+from hybrid_rt.kernels import certified_simd as simd_kernels
 from hybrid_rt.lists import primitive_lists
 from hybrid_rt.modes import Certified
-from hybrid_rt.pyramid import build_depth_pyramid
-from hybrid_rt.types import DepthPyramid, GBuffer, Marched, Rays
+from hybrid_rt.pyramid import bits, build_depth_pyramid
+from hybrid_rt.types import F64, Camera, DepthPyramid, GBuffer, Marched, PrimitiveLists, Rays, Scene
 
 LENGTH = 8
 """Length of the lists that are made where a G-buffer has none."""
@@ -31,19 +34,78 @@ def march(
     -----
     The proof and its error bounds are in `hybrid_rt.kernels.certified` and docs/certified.md.
     """
-    scene, camera = gbuffer.scene, gbuffer.camera
     lists = gbuffer.lists
     if lists is None:
-        lists = primitive_lists(scene, camera, LENGTH, threads)
+        lists = primitive_lists(gbuffer.scene, gbuffer.camera, LENGTH, threads)
         gbuffer = replace(gbuffer, lists=lists)
     if not pyramid.conservative:
         pyramid = build_depth_pyramid(gbuffer, conservative=True, threads=threads)
-    m = camera.pixel_from_world
-    rows = np.abs(m).sum(axis=1)
-    longer = max(camera.width, camera.height) + 1
-    max_steps = 2 * (camera.width + camera.height) + 64
-    low, high = scene.bounds
-    marched = Marched.unfilled(len(rays), len(pyramid))
+    width, height = gbuffer.camera.width, gbuffer.camera.height
+    max_steps = 2 * (width + height) + 64 if mode.max_steps is None else mode.max_steps
+    limits = max_steps, mode.max_tests, any_hit
+    if mode.vectors and _countable(rays, lists, pyramid):
+        return _in_lanes(
+            rays, gbuffer.scene, gbuffer.camera, lists, pyramid, limits, mode.probes, threads
+        )
+    return _one_by_one(rays, gbuffer.scene, gbuffer.camera, lists, pyramid, limits, threads)
+
+
+def _countable(rays: Rays, lists: PrimitiveLists, pyramid: DepthPyramid) -> bool:
+    """Can the lanes, which are int32, index every array. A face has 9 coordinates of corners."""
+    sizes = 3 * len(rays), lists.prim_id.size, 9 * len(lists.planes), pyramid.data.size
+    return max(sizes) < 2**31
+
+
+def _in_lanes(
+    rays: Rays,
+    scene: Scene,
+    camera: Camera,
+    lists: PrimitiveLists,
+    pyramid: DepthPyramid,
+    limits: tuple[int, int, bool],
+    probes: int,
+    threads: int | None,
+) -> Marched:
+    """March as many rays at a time as a vector has lanes."""
+    width, height = camera.width, camera.height
+    columns, rows = bits(width, height)
+    marched = Marched.unfilled(len(rays))
+    with _threads.limited(threads) as workers:
+        tests = np.zeros(workers, np.int64)
+        simd_kernels.march(
+            workers,
+            tuple(_flat(a) for a in (rays.origin, rays.direction, rays.t_near, rays.t_far)),
+            (width, height),
+            _box(scene, camera),
+            _flat(lists.prim_id),
+            _flat(lists.nearest),
+            _flat(lists.rest),
+            _flat(lists.planes),
+            (width, height, lists.length, min(columns, rows)),
+            pyramid.data,
+            (rows, columns),
+            _flat(scene.corners),
+            *limits,
+            probes,
+            marched.rows,
+            tests,
+        )
+    return replace(marched, tests=int(tests.sum()))
+
+
+def _one_by_one(
+    rays: Rays,
+    scene: Scene,
+    camera: Camera,
+    lists: PrimitiveLists,
+    pyramid: DepthPyramid,
+    limits: tuple[int, int, bool],
+    threads: int | None,
+) -> Marched:
+    """March one ray after the other."""
+    # As the lanes, rays go up to the level at which the shorter axis is one cell.
+    levels = min(bits(camera.width, camera.height)) + 1
+    marched = Marched.unfilled(len(rays))
     with _threads.limited(threads) as workers:
         steps_by_level = np.zeros((workers, len(pyramid)), np.int64)
         tests = np.zeros((workers, 1), np.int64)
@@ -58,22 +120,30 @@ def march(
             lists.rest,
             lists.planes,
             pyramid.data,
-            pyramid.offsets,
-            pyramid.widths,
+            pyramid.offsets[:levels],
+            pyramid.pitches,
             scene.vertices,
             scene.faces,
-            m,
-            np.array(camera.eye),
-            camera.near,
-            float(max(rows[0], rows[1]) / longer + rows[2]),
-            low,
-            high,
-            max_steps if mode.max_steps is None else mode.max_steps,
-            mode.max_tests,
-            any_hit,
+            *_box(scene, camera),
+            *limits,
             *marched.rows,
             steps_by_level,
             tests,
         )
-    steps_by_level.sum(axis=0, out=marched.steps_by_level)
-    return replace(marched, tests=int(tests.sum()))
+    return replace(marched, steps_by_level=steps_by_level.sum(axis=0), tests=int(tests.sum()))
+
+
+def _box(scene: Scene, camera: Camera) -> tuple[F64, F64, float, float, F64, F64]:
+    """Return the projection, the eye, the near plane, `spread` (see `kernels.trusted`), bounds."""
+    m = camera.pixel_from_world
+    rows = np.abs(m).sum(axis=1)
+    longer = max(camera.width, camera.height) + 1
+    low, high = scene.bounds
+    spread = float(max(rows[0], rows[1]) / longer + rows[2])
+    return m, np.array(camera.eye), float(camera.near), spread, low, high
+
+
+def _flat(values: NDArray[Any]) -> NDArray[Any]:
+    """Return an array in one dimension, as vectors are loaded from; a copy if it has gaps."""
+    # A read-only array has a type of its own in Numba and would compile the kernel again.
+    return np.require(values, requirements=["C", "W"]).reshape(-1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from hybrid_rt import _threads
@@ -16,7 +18,7 @@ def march(
     """Return what `PixelDDA` says about each ray; `hybrid_rt.march` has checked the arguments."""
     height, width = gbuffer.depth.shape
     max_steps = width + height + 2 if mode.max_steps is None else mode.max_steps
-    marched = Marched.unfilled(len(rays), len(pyramid))
+    marched = Marched.unfilled(len(rays))
     with _threads.limited(threads) as workers:
         kernels.march(
             workers,
@@ -33,6 +35,6 @@ def march(
             *marched.rows,
         )
     # Every sample is of the depth buffer itself.
-    marched.steps_by_level[:] = 0
-    marched.steps_by_level[0] = marched.steps.sum(dtype=np.int64)
-    return marched
+    steps_by_level = np.zeros(len(pyramid), np.int64)
+    steps_by_level[0] = marched.steps.sum(dtype=np.int64)
+    return replace(marched, steps_by_level=steps_by_level)

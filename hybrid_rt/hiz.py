@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from hybrid_rt import _threads
@@ -14,7 +16,7 @@ def march(
     rays: Rays, gbuffer: GBuffer, pyramid: DepthPyramid, mode: HiZ, threads: int | None
 ) -> Marched:
     """Return what `HiZ` says about each ray; `hybrid_rt.march` has checked the arguments."""
-    marched = Marched.unfilled(len(rays), len(pyramid))
+    marched = Marched.unfilled(len(rays))
     with _threads.limited(threads) as workers:
         steps_by_level = np.zeros((workers, len(pyramid)), np.int64)
         kernels.march(
@@ -26,7 +28,7 @@ def march(
             gbuffer.prim_id,
             pyramid.data,
             pyramid.offsets,
-            pyramid.widths,
+            pyramid.pitches,
             gbuffer.camera.pixel_from_world,
             np.array(gbuffer.camera.eye),
             gbuffer.camera.near,
@@ -39,5 +41,4 @@ def march(
             *marched.rows,
             steps_by_level,
         )
-    steps_by_level.sum(axis=0, out=marched.steps_by_level)
-    return marched
+    return replace(marched, steps_by_level=steps_by_level.sum(axis=0))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from dataclasses import replace
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -13,7 +14,8 @@ from hybrid_rt.kernels import hybrid as kernels
 from hybrid_rt.march import march
 from hybrid_rt.modes import Certified, Mode
 from hybrid_rt.types import (
-    I64,
+    F32,
+    I32,
     Bool,
     GBuffer,
     Hits,
@@ -24,11 +26,15 @@ from hybrid_rt.types import (
     Rays,
 )
 
-Answer = TypeVar("Answer")
+Answers = TypeVar("Answers", Hits, Bool)
 
 
 class Tracer(Protocol):
-    """Whatever answers rays exactly."""
+    """Whatever answers rays exactly.
+
+    If it has a method `intersect_into` like `EmbreeTracer.intersect_into`, that is called instead:
+    then no ray and no hit is copied.
+    """
 
     def intersect(self, rays: Rays) -> Hits:
         """Return the nearest hit of each ray."""
@@ -36,7 +42,7 @@ class Tracer(Protocol):
 
 
 class OcclusionTracer(Protocol):
-    """Whatever says exactly which rays are free."""
+    """Whatever says exactly which rays are free; `occluded_into` is called instead where it is."""
 
     def occluded(self, rays: Rays) -> Bool:
         """Return, as (N,) bool, whether each ray hits anything between its t_near and t_far."""
@@ -80,31 +86,37 @@ def trace_hybrid(
     -----
     Unresolved rays are traced in their order, so that neighbours stay neighbours; in mode
     "certified" from where the march has proven them free (`hybrid_rt.kernels.hybrid.handed_over`).
-    `timings` holds
-    wall-clock seconds, without JIT compilation only from the second call on.
+    "compaction" makes a list of them, "fallback" writes their hits into their rows of the result,
+    and "merge" those of the others. `timings` holds wall-clock seconds, without JIT compilation
+    only from the second call on.
     """
 
-    def merge(marched: Marched, starts: I64, traced: Hits) -> Hits:
+    def first() -> Marched:
+        return march(rays, gbuffer, pyramid, mode, threads=threads)
+
+    def trace(indices: I32, t_near: F32 | None) -> Hits:
         hits = Hits.unfilled(len(rays))
-        kernels.merge(
+        into: Any = getattr(tracer, "intersect_into", None)
+        if into is None:
+            hits.put(indices, tracer.intersect(_rest(rays, indices, t_near)))
+        else:
+            into(rays, hits, indices, t_near)
+        return hits
+
+    def merge(marched: Marched, hits: Hits, workers: int) -> None:
+        kernels.answer_hits(
+            workers,
             marched.resolved,
-            starts,
             rays.origin,
             rays.direction,
             marched.prim_id,
             marched.t,
             gbuffer.scene.vertices,
             gbuffer.scene.faces,
-            *traced.arrays,
             *hits.arrays,
         )
-        return hits
 
-    def first() -> Marched:
-        return march(rays, gbuffer, pyramid, mode, threads=threads)
-
-    reach = _reach(gbuffer, mode)
-    return HybridResult(*_in_stages(rays, first, reach, tracer.intersect, merge, threads))
+    return HybridResult(*_in_stages(rays, first, _reach(gbuffer, mode), trace, merge, threads))
 
 
 def occluded_hybrid(
@@ -142,16 +154,22 @@ def occluded_hybrid(
     As for `trace_hybrid`.
     """
 
-    def merge(marched: Marched, starts: I64, traced: Bool) -> Bool:
-        occluded = np.empty(len(rays), np.bool_)
-        kernels.merge_occlusion(marched.resolved, starts, marched.prim_id, traced, occluded)
-        return occluded
-
     def first() -> Marched:
         return march(rays, gbuffer, pyramid, mode, any_hit=True, threads=threads)
 
-    reach = _reach(gbuffer, mode)
-    return OcclusionResult(*_in_stages(rays, first, reach, tracer.occluded, merge, threads))
+    def trace(indices: I32, t_near: F32 | None) -> Bool:
+        occluded = np.empty(len(rays), np.bool_)
+        into: Any = getattr(tracer, "occluded_into", None)
+        if into is None:
+            occluded[indices] = tracer.occluded(_rest(rays, indices, t_near))
+        else:
+            into(rays, occluded, indices, t_near)
+        return occluded
+
+    def merge(marched: Marched, occluded: Bool, workers: int) -> None:
+        kernels.answer_occlusion(marched.resolved, marched.prim_id, occluded)
+
+    return OcclusionResult(*_in_stages(rays, first, _reach(gbuffer, mode), trace, merge, threads))
 
 
 def _reach(gbuffer: GBuffer, mode: str | Mode) -> float | None:
@@ -166,49 +184,48 @@ def _in_stages(
     rays: Rays,
     first: Callable[[], Marched],
     reach: float | None,
-    trace: Callable[[Rays], Answer],
-    merge: Callable[[Marched, I64, Answer], Answer],
+    trace: Callable[[I32, F32 | None], Answers],
+    merge: Callable[[Marched, Answers, int], None],
     threads: int | None,
-) -> tuple[Answer, Marched, dict[str, float]]:
-    """March, trace what is left, merge; return the answers, the march, and seconds by stage."""
+) -> tuple[Answers, Marched, dict[str, float]]:
+    """March, trace what is left, merge; return the answers, the march, and seconds by stage.
+
+    `trace` makes room for all answers and writes those of some rays, `merge` writes the others.
+    """
     clock = [time.perf_counter()]
     marched = first()
     clock.append(time.perf_counter())
-    with _threads.limited(threads):
-        starts, rest = _compact(rays, marched, reach)
+    with _threads.limited(threads) as workers:
+        indices = _unresolved(marched)
+        t_near = None if reach is None else _handed_over(rays, marched, indices, reach)
         clock.append(time.perf_counter())
-        traced = trace(rest)
+        answers = trace(indices, t_near)
         clock.append(time.perf_counter())
-        merged = merge(marched, starts, traced)
+        merge(marched, answers, workers)
         clock.append(time.perf_counter())
     stages = ("march", "compaction", "fallback", "merge")
-    return merged, marched, {stage: clock[k + 1] - clock[k] for k, stage in enumerate(stages)}
+    return answers, marched, {stage: clock[k + 1] - clock[k] for k, stage in enumerate(stages)}
 
 
-def _compact(rays: Rays, marched: Marched, reach: float | None) -> tuple[I64, Rays]:
-    """Return, for each chunk, how many unresolved rays come before it, and the unresolved rays.
+def _unresolved(marched: Marched) -> I32:
+    """Return, as (M,) int32, which rays the march left unresolved, in their order."""
+    counts = np.empty(-(-len(marched) // kernels.CHUNK), np.int64)
+    kernels.count_unresolved(marched.resolved, counts)
+    indices = np.empty(int(counts.sum()), np.int32)
+    kernels.list_unresolved(marched.resolved, np.cumsum(counts) - counts, indices)
+    return indices
 
-    With `reach` they start where the march has left them.
-    """
-    resolved = marched.resolved
-    counts = np.empty(-(-len(rays) // kernels.CHUNK), np.int64)
-    kernels.count_unresolved(resolved, counts)
-    m = int(counts.sum())
-    starts = np.cumsum(counts) - counts
-    rest = Rays(
-        np.empty((m, 3), np.float32),
-        np.empty((m, 3), np.float32),
-        np.empty((m, 2), np.int32),
-        np.empty(m, np.float32),
-        np.empty(m, np.float32),
+
+def _handed_over(rays: Rays, marched: Marched, indices: I32, reach: float) -> F32:
+    """Return a t_near, (N,) float32, that is set only for the rays at `indices`."""
+    t_near = np.empty(len(rays), np.float32)
+    kernels.hand_over(
+        indices, rays.origin, rays.direction, rays.t_near, marched.t_free, reach, t_near
     )
-    kernels.compact(
-        resolved,
-        starts,
-        reach is not None,
-        marched.t_free,
-        reach or 0.0,
-        *rays.arrays,
-        *rest.arrays,
-    )
-    return starts, rest
+    return t_near
+
+
+def _rest(rays: Rays, indices: I32, t_near: F32 | None) -> Rays:
+    """Return the rays at `indices`, for a tracer that takes no indices."""
+    rest = rays.take(indices)
+    return rest if t_near is None else replace(rest, t_near=t_near[indices])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from hybrid_rt import _threads
@@ -14,7 +16,7 @@ def march(
     rays: Rays, gbuffer: GBuffer, pyramid: DepthPyramid, mode: Linear, threads: int | None
 ) -> Marched:
     """Return what `Linear` says about each ray; `hybrid_rt.march` has checked the arguments."""
-    marched = Marched.unfilled(len(rays), len(pyramid))
+    marched = Marched.unfilled(len(rays))
     with _threads.limited(threads) as workers:
         kernels.march(
             workers,
@@ -31,6 +33,6 @@ def march(
             *marched.rows,
         )
     # Every sample is of the depth buffer itself.
-    marched.steps_by_level[:] = 0
-    marched.steps_by_level[0] = marched.steps.sum(dtype=np.int64)
-    return marched
+    steps_by_level = np.zeros(len(pyramid), np.int64)
+    steps_by_level[0] = marched.steps.sum(dtype=np.int64)
+    return replace(marched, steps_by_level=steps_by_level)

@@ -45,6 +45,10 @@ class Paper:
             _check.integer("max_steps", self.max_steps, least=1, most=2**31 - 1)
 
 
+PROBES = (1, 2, 4, 8, 16)
+"""Of 16 rays, how many mode "certified" can be told to march first."""
+
+
 @dataclass(frozen=True)
 class Certified:
     """Answers only what is proven, "certified": never a wrong hit, never a wrong miss.
@@ -66,17 +70,33 @@ class Certified:
         Step budget of a ray. By default 2 (W + H) + 64, which no ray can use up.
     hand_over : bool
         Whether `hybrid_rt.trace_hybrid` starts unresolved rays where the proof ended.
+    probes : {1, 2, 4, 8, 16}
+        Of each 16 consecutive rays so many, evenly spread, are marched first, and the others only
+        if the screen answered one of them. It saves marches where the screen has nothing to say.
+        No answer changes: a ray that is left out is unresolved, `MarchStatus.SKIPPED`, whether or
+        not the screen could have answered it, and goes to the tracer. 16 marches all rays.
+    vectors : bool
+        Whether rays are marched in the lanes of vectors, several at a time. The answers are the
+        same, bit for bit, without; steps are then counted by level too. Without, `probes` must
+        be 16.
     """
 
     max_tests: int = 64
     max_steps: int | None = None
     hand_over: bool = True
+    probes: int = 16
+    vectors: bool = True
 
     def __post_init__(self) -> None:
         _check.integer("max_tests", self.max_tests, least=1, most=2**31 - 1)
         if self.max_steps is not None:
             _check.integer("max_steps", self.max_steps, least=1, most=2**31 - 1)
         _check.instance("hand_over", self.hand_over, bool)
+        _check.integer("probes", self.probes, least=1, most=16)
+        _check.choice("probes", self.probes, PROBES)
+        _check.instance("vectors", self.vectors, bool)
+        if not self.vectors and self.probes != 16:
+            raise ArgumentError("probes", "16 where vectors=False", str(self.probes))
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from hybrid_rt import _threads
@@ -16,7 +18,7 @@ def march(
     """Return what `Paper` says about each ray; arguments as `hybrid_rt.march` has checked them."""
     height, width = gbuffer.depth.shape
     max_steps = 2 * (width + height) + 2 if mode.max_steps is None else mode.max_steps
-    marched = Marched.unfilled(len(rays), len(pyramid))
+    marched = Marched.unfilled(len(rays))
     with _threads.limited(threads) as workers:
         steps_by_level = np.zeros((workers, len(pyramid)), np.int64)
         kernels.march(
@@ -28,7 +30,7 @@ def march(
             gbuffer.prim_id,
             pyramid.data,
             pyramid.offsets,
-            pyramid.widths,
+            pyramid.pitches,
             gbuffer.camera.pixel_from_world,
             np.array(gbuffer.camera.eye),
             gbuffer.camera.near,
@@ -37,5 +39,4 @@ def march(
             *marched.rows,
             steps_by_level,
         )
-    steps_by_level.sum(axis=0, out=marched.steps_by_level)
-    return marched
+    return replace(marched, steps_by_level=steps_by_level.sum(axis=0))

@@ -55,19 +55,31 @@ def build_depth_pyramid(
             )
         depth = np.ascontiguousarray(gbuffer.lists.nearest[:, :, 0])
     height, width = depth.shape
-    offsets, widths, heights = layout(width, height)
-    data = np.empty(int(offsets[-1]) + 1, np.float32)
+    cells, levels = layout(width, height)
+    data = np.empty(cells, np.float32)
     with _threads.limited(threads):
-        kernels.build(depth, offsets, widths, heights, data)
-    return DepthPyramid(data, offsets, widths, heights, conservative)
+        kernels.build(depth, *levels, data)
+    return DepthPyramid(data, *levels, conservative)
 
 
-def layout(width: int, height: int) -> tuple[I64, I64, I64]:
-    """Return offsets, widths and heights, (L,) int64, of the levels of a pyramid."""
-    sizes = [(width, height)]
-    while sizes[-1] != (1, 1):
-        w, h = sizes[-1]
-        sizes.append((-(-w // 2), -(-h // 2)))
-    widths, heights = np.array(sizes, np.int64).T.copy()
-    cells = widths * heights
-    return np.cumsum(cells) - cells, widths, heights
+def bits(width: int, height: int) -> tuple[int, int]:
+    """Return the least (a, b) with width <= 2**a and height <= 2**b."""
+    return (width - 1).bit_length(), (height - 1).bit_length()
+
+
+def layout(width: int, height: int) -> tuple[int, tuple[I64, I64, I64, I64]]:
+    """Return how many cells to make room for and where the levels of a pyramid lie.
+
+    The levels are given by their offsets, pitches, widths and heights, (L,) int64 each. A level is
+    padded to powers of two and begins at its own size, so that what is left below holds all coarser
+    levels, and a kernel can compute a cell's place from the level alone:
+    ``2**(a + b - 2 l) + (y << (a - l)) + x``, with a, b = `bits`, up to the level l = min(a, b) at
+    which the shorter axis is one cell. The padding is never written: the cell of a pixel of the
+    image is never in it, and no march looks up a cell before it knows that its pixel is one.
+    """
+    a, b = bits(width, height)
+    level = np.arange(max(a, b) + 1)
+    columns, rows = np.maximum(a - level, 0), np.maximum(b - level, 0)
+    widths, heights = -(-width >> level), -(-height >> level)
+    offsets, pitches = 1 << (columns + rows), 1 << columns
+    return int(offsets[0] + pitches[0] * height), (offsets, pitches, widths, heights)

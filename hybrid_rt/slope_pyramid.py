@@ -40,8 +40,8 @@ def build_slope_pyramid(gbuffer: GBuffer, *, threads: int | None = None) -> Slop
     """
     _check.instance("gbuffer", gbuffer, GBuffer)
     height, width = gbuffer.depth.shape
-    offsets, widths, heights = layout(width, height)
-    data = np.empty((int(offsets[-1]) + 1, 3), np.float32)
+    cells, levels = layout(width, height)
+    data = np.empty((cells, 3), np.float32)
     with _threads.limited(threads):
-        kernels.build(gbuffer.depth, gbuffer.ddx, gbuffer.ddy, offsets, widths, heights, data)
-    return SlopePyramid(data, offsets, widths, heights)
+        kernels.build(gbuffer.depth, gbuffer.ddx, gbuffer.ddy, *levels, data)
+    return SlopePyramid(data, *levels)

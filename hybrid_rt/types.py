@@ -151,6 +151,11 @@ class Scene:
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
     @cached_property
+    def corners(self) -> F32:
+        """(F, 9) float32, world: the three vertices of each triangle, side by side, 36 bytes."""
+        return self.vertices[self.faces].reshape(-1, 9)
+
+    @cached_property
     def diagonal(self) -> float:
         """Length of the bounding box's diagonal, world units: what a scene's lengths relate to."""
         low, high = self.bounds
@@ -363,11 +368,14 @@ class DepthPyramid:
 
     Attributes
     ----------
-    data : (sum of all cells,) float32
-        All levels, row by row, one after the other.
+    data : (cells,) float32
+        All levels, row by row, each padded to powers of two; see `hybrid_rt.pyramid.layout`.
     offsets : (L,) int64
         Index of the first cell of each level in `data`.
+    pitches : (L,) int64
+        Cells from the start of a row of a level to the start of the next.
     widths, heights : (L,) int64
+        Cells of a level without its padding.
     conservative : bool
         Whether the depths are those of pixel squares (the first bounds of `PrimitiveLists`) and
         not those of pixel centres.
@@ -375,6 +383,7 @@ class DepthPyramid:
 
     data: F32
     offsets: I64
+    pitches: I64
     widths: I64
     heights: I64
     conservative: bool = False
@@ -385,8 +394,7 @@ class DepthPyramid:
     def level(self, index: int) -> F32:
         """Return level `index` as a (height, width) view of `data`."""
         n = _check.integer("index", index, least=0, most=len(self) - 1)
-        start, w, h = int(self.offsets[n]), int(self.widths[n]), int(self.heights[n])
-        return self.data[start : start + w * h].reshape(h, w)
+        return _level(self, n)
 
 
 @dataclass(frozen=True, eq=False)
@@ -400,15 +408,15 @@ class SlopePyramid:
 
     Attributes
     ----------
-    data : (sum of all cells, 3) float32
-        a, b_x, b_y, in depth and depth a pixel; all levels, row by row, one after the other.
-    offsets : (L,) int64
-        Index of the first cell of each level in `data`.
-    widths, heights : (L,) int64
+    data : (cells, 3) float32
+        a, b_x, b_y, in depth and depth a pixel; the levels lie as in a DepthPyramid.
+    offsets, pitches, widths, heights : (L,) int64
+        As in a DepthPyramid.
     """
 
     data: F32
     offsets: I64
+    pitches: I64
     widths: I64
     heights: I64
 
@@ -418,12 +426,19 @@ class SlopePyramid:
     def level(self, index: int) -> F32:
         """Return level `index` as a (height, width, 3) view of `data`."""
         n = _check.integer("index", index, least=0, most=len(self) - 1)
-        start, w, h = int(self.offsets[n]), int(self.widths[n]), int(self.heights[n])
-        return self.data[start : start + w * h].reshape(h, w, 3)
+        return _level(self, n)
 
 
 Pyramid = DepthPyramid | SlopePyramid
 """What a march goes through."""
+
+
+def _level(pyramid: Pyramid, n: int) -> F32:
+    """Return level n, (height, width, ...), as a view without its padding."""
+    start, pitch = int(pyramid.offsets[n]), int(pyramid.pitches[n])
+    height, width = int(pyramid.heights[n]), int(pyramid.widths[n])
+    rows = pyramid.data[start : start + height * pitch]
+    return rows.reshape(height, pitch, *pyramid.data.shape[1:])[:, :width]
 
 
 @dataclass(frozen=True, eq=False)
@@ -592,6 +607,8 @@ class MarchStatus(enum.IntEnum):
     """NaN, an infinity or a zero direction."""
     UNDECIDED = 7
     """Certified only: two hits, or a hit and a miss, are closer than float64 can tell apart."""
+    SKIPPED = 8
+    """Certified only: not marched, since no probe near it in the order of the rays was resolved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -615,8 +632,8 @@ class Marched:
         Up to here the march found the ray in front of everything that it read.
     steps : (N,) int32
         Samples of the pyramid that the ray took.
-    steps_by_level : (L,) int64
-        The same, summed over the rays, for each level.
+    steps_by_level : (L,) int64, optional
+        The same, summed over the rays, for each level; None where it was not counted.
     tests : int
         Exact tests of a ray against a primitive, over all rays; only mode "certified" makes any.
     """
@@ -628,11 +645,11 @@ class Marched:
     t: F32
     t_free: F32
     steps: I32
-    steps_by_level: I64
+    steps_by_level: I64 | None = None
     tests: int = 0
 
     @classmethod
-    def unfilled(cls, n: int, levels: int) -> Marched:
+    def unfilled(cls, n: int) -> Marched:
         """Return room for `n` rays, with nothing in it yet, for code that writes every row."""
         return cls(
             np.empty(n, np.uint8),
@@ -642,7 +659,6 @@ class Marched:
             np.empty(n, np.float32),
             np.empty(n, np.float32),
             np.empty(n, np.int32),
-            np.empty(levels, np.int64),
         )
 
     @property

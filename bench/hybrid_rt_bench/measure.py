@@ -137,7 +137,7 @@ def measure_cell(
     reference = loaded.reference.intersect(rays)
     results, verdicts = [], []
     unstable: dict[str, float] = {}
-    steps_by_level: dict[str, NDArray[np.int64]] = {}
+    steps_by_level: dict[str, NDArray[np.int64] | None] = {}
     for technique in techniques:
         result = hrt.trace_hybrid(
             rays, gbuffer, pyramid, stages.tracer, mode=technique.mode, threads=threads
@@ -166,7 +166,8 @@ def measure_cell(
         "embree_ns_per_ray": mirror_choice.nanoseconds,
         "embree_primary_ns_per_ray": primary_choice.nanoseconds,
         "steps_by_level": {
-            technique: [int(n) for n in steps] for technique, steps in steps_by_level.items()
+            technique: None if steps is None else [int(n) for n in steps]
+            for technique, steps in steps_by_level.items()
         },
     }
     return CellRecord(details, rows, results, verdicts, picture or None)

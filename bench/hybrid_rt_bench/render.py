@@ -33,6 +33,7 @@ STATUS_COLOURS = {
     hrt.MarchStatus.EXHAUSTED: (204, 121, 167),
     hrt.MarchStatus.INVALID: (226, 26, 28),
     hrt.MarchStatus.UNDECIDED: (120, 94, 60),
+    hrt.MarchStatus.SKIPPED: (60, 60, 60),
 }
 STATUS_WORDS = {
     hrt.MarchStatus.HIT: "hit: answered",
@@ -43,6 +44,7 @@ STATUS_WORDS = {
     hrt.MarchStatus.EXHAUSTED: "exhausted: step budget",
     hrt.MarchStatus.INVALID: "invalid",
     hrt.MarchStatus.UNDECIDED: "undecided: closer than can be told",
+    hrt.MarchStatus.SKIPPED: "skipped: no probe answered",
 }
 SHEET = 960
 """Width of a picture on a contact sheet."""

@@ -223,8 +223,13 @@ def apart(planes, prim, s, s_exit, x0, y0, z0, sx, sy, sz, z_error):
 @inlined
 def walk(
     i, origin, direction, ray, t_near, t_far, status, x, y, depth, dx, dy, dz, s_end, z, gz,
+<<<<<<< HEAD
     prim_id, nearest, rest, planes, cells, offsets, widths, vertices, faces, max_steps, max_tests,
     any_hit, steps_by_level,
+=======
+    prim_id, nearest, rest, planes, cells, offsets, pitches, vertices, faces,
+    max_steps, max_tests, any_hit, steps_by_level,
+>>>>>>> integrate
 ):  # fmt: skip
     """March one ray; return (status, pixel x, pixel y, prim, t, s proven free, steps, tests)."""
     height, width, length = prim_id.shape
@@ -260,7 +265,7 @@ def walk(
             return EXHAUSTED, -1, -1, -1, math.inf, s / scale, steps, tests
         steps += 1
         steps_by_level[level] += 1
-        near = cells[offsets[level] + ly * widths[level] + lx]
+        near = cells[offsets[level] + ly * pitches[level] + lx]
         lowest = depth_at(z0, sz, s_exit if sz < F0 else s)
         if near > F0 and not lowest > near:
             if level > 0:
@@ -330,7 +335,7 @@ def walk(
 @kernel
 def march_chunk(
     first, last, origin, direction, t_near, t_far, prim_id, nearest, rest, planes,
-    cells, offsets, widths, vertices, faces, m, eye, near, spread, low, high,
+    cells, offsets, pitches, vertices, faces, m, eye, near, spread, low, high,
     max_steps, max_tests, any_hit,
     status, resolved, pixel, prim, t, t_free, steps, steps_by_level, tests,
 ):  # fmt: skip
@@ -360,7 +365,7 @@ def march_chunk(
                 how, hit_x, hit_y, found, at, s_free, count, tested = walk(
                     i, origin, direction, frame(direction[i]), start, stop, how,
                     x, y, z0, dx, dy, dz, s_end, z, gz,
-                    prim_id, nearest, rest, planes, cells, offsets, widths, vertices, faces,
+                    prim_id, nearest, rest, planes, cells, offsets, pitches, vertices, faces,
                     max_steps, max_tests, any_hit, steps_by_level,
                 )  # fmt: skip
         tests[0] += tested
@@ -384,7 +389,7 @@ def march_chunk(
 @parallel_kernel
 def march(
     workers, origin, direction, t_near, t_far, prim_id, nearest, rest, planes,
-    cells, offsets, widths, vertices, faces, m, eye, near, spread, low, high,
+    cells, offsets, pitches, vertices, faces, m, eye, near, spread, low, high,
     max_steps, max_tests, any_hit,
     status, resolved, pixel, prim, t, t_free, steps, steps_by_level, tests,
 ):  # fmt: skip
@@ -396,7 +401,7 @@ def march(
         while first < n:
             march_chunk(
                 first, min(n, first + CHUNK), origin, direction, t_near, t_far,
-                prim_id, nearest, rest, planes, cells, offsets, widths, vertices, faces,
+                prim_id, nearest, rest, planes, cells, offsets, pitches, vertices, faces,
                 m, eye, near, spread, low, high, max_steps, max_tests, any_hit,
                 status, resolved, pixel, prim, t, t_free, steps, steps_by_level[worker],
                 tests[worker],

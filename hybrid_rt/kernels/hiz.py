@@ -37,7 +37,7 @@ def within_cell(place, coarse, level, now, step):
 @inlined
 def march_ray(
     status, x, y, z0, dx, dy, dz, s_end, own_x, own_y, width, height,
-    cells, offsets, widths, max_steps, steps_by_level,
+    cells, offsets, pitches, max_steps, steps_by_level,
 ):  # fmt: skip
     """March one ray; return (status, pixel x, pixel y, s, samples) of where it stops.
 
@@ -66,7 +66,7 @@ def march_ray(
                 return EXHAUSTED, cx, cy, s, steps
             steps += 1
             steps_by_level[level] += 1
-            nearest = cells[offsets[level] + ly * widths[level] + lx]
+            nearest = cells[offsets[level] + ly * pitches[level] + lx]
             if nearest > F0 and not z0 + dz * (s_exit if dz < F0 else s) > nearest:
                 if z0 + dz * s > nearest:
                     # In front at its entry: it meets the cell's depth on its way away from the eye.
@@ -134,7 +134,7 @@ def confidence(i, j, s, depth, ddx, ddy, x0, y0, z0, dx, dy, dz, near, thickness
 @kernel
 def march_chunk(
     first, last, origin, direction, ray_pixel, t_near, t_far, depth, ddx, ddy, prim_id,
-    cells, offsets, widths, m, eye, near,
+    cells, offsets, pitches, m, eye, near,
     thickness, threshold, border, exhausted_hits, trace_background, max_steps,
     status, resolved, pixel, prim, t, t_free, steps, steps_by_level,
 ):  # fmt: skip
@@ -156,7 +156,7 @@ def march_chunk(
             how, at_x, at_y, s, count = march_ray(
                 end, x0, y0, z0, ex, ey, ez, np.float32(s_end),
                 ray_pixel[i, 0], ray_pixel[i, 1], width, height,
-                cells, offsets, widths, max_steps, steps_by_level,
+                cells, offsets, pitches, max_steps, steps_by_level,
             )  # fmt: skip
             judged = how == HIT or (how == EXHAUSTED and exhausted_hits)
             if (judged or how == MISS) and depth[at_y, at_x] <= F0:
@@ -179,7 +179,7 @@ def march_chunk(
 @parallel_kernel
 def march(
     workers, origin, direction, ray_pixel, t_near, t_far, depth, ddx, ddy, prim_id,
-    cells, offsets, widths, m, eye, near,
+    cells, offsets, pitches, m, eye, near,
     thickness, threshold, border, exhausted_hits, trace_background, max_steps,
     status, resolved, pixel, prim, t, t_free, steps, steps_by_level,
 ):  # fmt: skip
@@ -191,7 +191,7 @@ def march(
         while first < n:
             march_chunk(
                 first, min(n, first + CHUNK), origin, direction, ray_pixel, t_near, t_far,
-                depth, ddx, ddy, prim_id, cells, offsets, widths, m, eye, near,
+                depth, ddx, ddy, prim_id, cells, offsets, pitches, m, eye, near,
                 thickness, threshold, border, exhausted_hits, trace_background, max_steps,
                 status, resolved, pixel, prim, t, t_free, steps, steps_by_level[worker],
             )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Split the rays between the screen and the tracer, and put the answers together again."""
+"""Split the rays between the screen and the tracer, and write what the screen answers."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 from numba import prange
 
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+from hybrid_rt.kernels._queue import fetch_add
 
 CHUNK = 4096  # rays counted together
 
@@ -41,44 +42,29 @@ def handed_over(i, origin, direction, t_free, reach):
 
 
 @parallel_kernel
-def compact(
-    resolved,
-    starts,
-    hand_over,
-    t_free,
-    reach,
-    origin,
-    direction,
-    pixel,
-    t_near,
-    t_far,
-    origin_out,
-    direction_out,
-    pixel_out,
-    t_near_out,
-    t_far_out,
-):
-    """Copy the unresolved rays together, in their order; starts (chunks,) int64.
-
-    With `hand_over` they start where they are no longer known to be free.
-    """
+def list_unresolved(resolved, starts, indices):
+    """Write which rays are unresolved, in their order; starts (chunks,) int64, indices int32."""
     n = resolved.shape[0]
     for chunk in prange(starts.shape[0]):
         j = starts[chunk]
         for i in range(chunk * CHUNK, min(n, (chunk + 1) * CHUNK)):
             if not resolved[i]:
-                for axis in range(3):
-                    origin_out[j, axis] = origin[i, axis]
-                    direction_out[j, axis] = direction[i, axis]
-                pixel_out[j, 0] = pixel[i, 0]
-                pixel_out[j, 1] = pixel[i, 1]
-                t_near_out[j] = t_near[i]
-                if hand_over:
-                    start = handed_over(i, origin, direction, t_free, reach)
-                    if start > t_near[i]:  # false for the NaN of a ray without direction
-                        t_near_out[j] = start
-                t_far_out[j] = t_far[i]
+                indices[j] = i
                 j += 1
+
+
+@parallel_kernel
+def hand_over(indices, origin, direction, t_near, t_free, reach, starts):
+    """Write from where the rays at `indices` are no longer known to be free; starts (N,) float32.
+
+    The other rows are left as they are.
+    """
+    for k in prange(indices.shape[0]):
+        i = indices[k]
+        starts[i] = t_near[i]
+        start = handed_over(i, origin, direction, t_free, reach)
+        if start > t_near[i]:  # false for the NaN of a ray without direction
+            starts[i] = start
 
 
 @kernel
@@ -136,65 +122,31 @@ def answer(i, origin, direction, prim, distance, vertices, faces, t, prim_id, u,
 
 
 @parallel_kernel
-def merge_occlusion(resolved, starts, march_prim, traced, occluded):
-    """Write whether each ray meets anything, from the march or else from the tracer; (N,) bool."""
-    n = resolved.shape[0]
-    for chunk in prange(starts.shape[0]):
-        j = starts[chunk]
-        for i in range(chunk * CHUNK, min(n, (chunk + 1) * CHUNK)):
-            if resolved[i]:
-                occluded[i] = march_prim[i] >= 0
-            else:
-                occluded[i] = traced[j]
-                j += 1
+def answer_occlusion(resolved, march_prim, occluded):
+    """Write whether each ray that the march resolved meets anything; (N,) bool."""
+    for i in prange(resolved.shape[0]):
+        if resolved[i]:
+            occluded[i] = march_prim[i] >= 0
 
 
 @parallel_kernel
-def merge(
-    resolved,
-    starts,
-    origin,
-    direction,
-    march_prim,
-    march_t,
-    vertices,
-    faces,
-    traced_t,
-    traced_prim,
-    traced_u,
-    traced_v,
-    traced_n_g,
-    t,
-    prim_id,
-    u,
-    v,
-    n_g,
-):
-    """Write every ray's hit, from the march where it resolved the ray, else from the tracer."""
+def answer_hits(
+    workers, resolved, origin, direction, march_prim, march_t, vertices, faces,
+    t, prim_id, u, v, n_g,
+):  # fmt: skip
+    """Write the hit of each ray that the march resolved; the other rows are left as they are.
+
+    Workers take chunks as they come: resolved rays lie together.
+    """
     n = resolved.shape[0]
-    for chunk in prange(starts.shape[0]):
-        j = starts[chunk]
-        for i in range(chunk * CHUNK, min(n, (chunk + 1) * CHUNK)):
-            if resolved[i]:
-                answer(
-                    i,
-                    origin,
-                    direction,
-                    march_prim[i],
-                    march_t[i],
-                    vertices,
-                    faces,
-                    t,
-                    prim_id,
-                    u,
-                    v,
-                    n_g,
-                )
-            else:
-                t[i] = traced_t[j]
-                prim_id[i] = traced_prim[j]
-                u[i] = traced_u[j]
-                v[i] = traced_v[j]
-                for axis in range(3):
-                    n_g[i, axis] = traced_n_g[j, axis]
-                j += 1
+    taken = np.zeros(1, np.int64)
+    for _worker in prange(workers):
+        first = fetch_add(taken.ctypes.data, CHUNK)
+        while first < n:
+            for i in range(first, min(n, first + CHUNK)):
+                if resolved[i]:
+                    answer(
+                        i, origin, direction, march_prim[i], march_t[i], vertices, faces,
+                        t, prim_id, u, v, n_g,
+                    )  # fmt: skip
+            first = fetch_add(taken.ctypes.data, CHUNK)

@@ -73,7 +73,7 @@ def march_ray(
     ddy,
     cells,
     offsets,
-    widths,
+    pitches,
     samples,
     max_steps,
     steps_by_level,
@@ -107,7 +107,7 @@ def march_ray(
                     return EXHAUSTED, -1, -1, F0, s, steps
                 steps += 1
                 steps_by_level[level] += 1
-                nearest = cells[offsets[level] + ly * widths[level] + lx]
+                nearest = cells[offsets[level] + ly * pitches[level] + lx]
                 farthest_ray = z0 + dz * (s_exit if dz < F0 else s)
                 if nearest > F0 and not farthest_ray > nearest:
                     blocked = True
@@ -182,7 +182,7 @@ def march_ray(
 @kernel
 def march_chunk(
     first, last, origin, direction, ray_pixel, t_near, t_far, depth, ddx, ddy, prim_id,
-    cells, offsets, widths, m, eye, near, samples, max_steps,
+    cells, offsets, pitches, m, eye, near, samples, max_steps,
     status, resolved, pixel, prim, t, t_free, steps, steps_by_level,
 ):  # fmt: skip
     """Set up rays in float64, march them in float32 and write their rows of the outputs."""
@@ -199,7 +199,7 @@ def march_chunk(
                 end, np.float32(x), np.float32(y), np.float32(z0),
                 np.float32(dx), np.float32(dy), np.float32(dz), np.float32(s_end),
                 ray_pixel[i, 0], ray_pixel[i, 1], depth, ddx, ddy,
-                cells, offsets, widths, samples, max_steps, steps_by_level,
+                cells, offsets, pitches, samples, max_steps, steps_by_level,
             )  # fmt: skip
         write_row(
             i, how, how == HIT, hit_x, hit_y, s_hit, s_free, count, s_end >= 0.0, z, gz,
@@ -210,7 +210,7 @@ def march_chunk(
 @parallel_kernel
 def march(
     workers, origin, direction, ray_pixel, t_near, t_far, depth, ddx, ddy, prim_id,
-    cells, offsets, widths, m, eye, near, samples, max_steps,
+    cells, offsets, pitches, m, eye, near, samples, max_steps,
     status, resolved, pixel, prim, t, t_free, steps, steps_by_level,
 ):  # fmt: skip
     """March rays (N, 3) through a pyramid; outputs (N,), steps_by_level (workers, L) int64."""
@@ -221,7 +221,7 @@ def march(
         while first < n:
             march_chunk(
                 first, min(n, first + CHUNK), origin, direction, ray_pixel, t_near, t_far,
-                depth, ddx, ddy, prim_id, cells, offsets, widths, m, eye, near, samples, max_steps,
+                depth, ddx, ddy, prim_id, cells, offsets, pitches, m, eye, near, samples, max_steps,
                 status, resolved, pixel, prim, t, t_free, steps, steps_by_level[worker],
             )  # fmt: skip
             first = fetch_add(taken.ctypes.data, CHUNK)

@@ -11,19 +11,18 @@ BAND_LEVELS = 4
 
 
 @kernel
-def reduce_rows(data, source, width, height, target, first, last):
+def reduce_rows(data, source, pitch, width, height, target, wide_pitch, first, last):
     """Make rows first..last-1 of a level at `target` from the level (height, width) at `source`.
 
-    Both are offsets into data (cells,) float32. A child beyond the last row or column stands for
-    the last one.
+    Both are offsets into data (cells,) float32, with rows `pitch` and `wide_pitch` apart. A child
+    beyond the last row or column stands for the last one.
     """
     half = width >> 1
     wide = (width + 1) >> 1
     for y in range(first, last):
-        upper = data[source + 2 * y * width : source + (2 * y + 1) * width]
-        below = min(2 * y + 1, height - 1)
-        lower = data[source + below * width : source + (below + 1) * width]
-        cells = data[target + y * wide : target + (y + 1) * wide]
+        above, below = source + 2 * y * pitch, source + min(2 * y + 1, height - 1) * pitch
+        upper, lower = data[above : above + width], data[below : below + width]
+        cells = data[target + y * wide_pitch : target + y * wide_pitch + wide]
         for x in range(half):
             left = max(upper[2 * x], lower[2 * x])
             right = max(upper[2 * x + 1], lower[2 * x + 1])
@@ -33,11 +32,11 @@ def reduce_rows(data, source, width, height, target, first, last):
 
 
 @parallel_kernel
-def build(depth, offsets, widths, heights, data):
+def build(depth, offsets, pitches, widths, heights, data):
     """Fill data (cells,) float32 with all levels of depth (H, W) float32; level 0 is a copy.
 
-    offsets, widths, heights (L,) int64. Each band of rows goes up as far as it stays whole while it
-    is in the cache; what is left above is small and is done at the end.
+    offsets, pitches, widths, heights (L,) int64. Each band of rows goes up as far as it stays whole
+    while it is in the cache; what is left above is small and is done at the end.
     """
     levels = len(offsets)
     low = min(BAND_LEVELS, levels - 1)
@@ -47,7 +46,8 @@ def build(depth, offsets, widths, heights, data):
         begin = band * rows
         end = min(begin + rows, height)
         for y in range(begin, end):
-            row = data[y * width : (y + 1) * width]
+            start = offsets[0] + y * pitches[0]
+            row = data[start : start + width]
             row[:] = depth[y]
         for level in range(1, low + 1):
             first = begin >> level
@@ -55,9 +55,11 @@ def build(depth, offsets, widths, heights, data):
             reduce_rows(
                 data,
                 offsets[level - 1],
+                pitches[level - 1],
                 widths[level - 1],
                 heights[level - 1],
                 offsets[level],
+                pitches[level],
                 first,
                 last,
             )
@@ -65,9 +67,11 @@ def build(depth, offsets, widths, heights, data):
         reduce_rows(
             data,
             offsets[level - 1],
+            pitches[level - 1],
             widths[level - 1],
             heights[level - 1],
             offsets[level],
+            pitches[level],
             0,
             heights[level],
         )

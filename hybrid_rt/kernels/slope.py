@@ -42,7 +42,7 @@ def height_above(data, cell, level, lx, ly, x, y, z):
 @inlined
 def march_ray(
     status, x, y, z0, dx, dy, dz, s_end, own_x, own_y, width, height,
-    data, offsets, widths, samples, max_steps, steps_by_level,
+    data, offsets, pitches, samples, max_steps, steps_by_level,
 ):  # fmt: skip
     """March one ray; return (status, pixel x, pixel y, s of the hit, s found free, steps)."""
     top = offsets.shape[0] - 1
@@ -71,7 +71,7 @@ def march_ray(
                     return EXHAUSTED, -1, -1, F0, s, steps
                 steps += 1
                 steps_by_level[level] += 1
-                cell = offsets[level] + ly * widths[level] + lx
+                cell = offsets[level] + ly * pitches[level] + lx
                 entry, slack = height_above(
                     data, cell, level, lx, ly, x + dx * s, y + dy * s, z0 + dz * s
                 )
@@ -105,7 +105,7 @@ def march_ray(
 @kernel
 def march_chunk(
     first, last, origin, direction, ray_pixel, t_near, t_far, prim_id,
-    data, offsets, widths, m, eye, near, samples, max_steps,
+    data, offsets, pitches, m, eye, near, samples, max_steps,
     status, resolved, pixel, prim, t, t_free, steps, steps_by_level,
 ):  # fmt: skip
     """Set up rays in float64, march them in float32 and write their rows of the outputs."""
@@ -122,7 +122,7 @@ def march_chunk(
                 end, np.float32(x), np.float32(y), np.float32(z0),
                 np.float32(dx), np.float32(dy), np.float32(dz), np.float32(s_end),
                 ray_pixel[i, 0], ray_pixel[i, 1], width, height,
-                data, offsets, widths, samples, max_steps, steps_by_level,
+                data, offsets, pitches, samples, max_steps, steps_by_level,
             )  # fmt: skip
         write_row(
             i, how, how == HIT, hit_x, hit_y, s_hit, s_free, count, s_end >= 0.0, z, gz,
@@ -133,7 +133,7 @@ def march_chunk(
 @parallel_kernel
 def march(
     workers, origin, direction, ray_pixel, t_near, t_far, prim_id,
-    data, offsets, widths, m, eye, near, samples, max_steps,
+    data, offsets, pitches, m, eye, near, samples, max_steps,
     status, resolved, pixel, prim, t, t_free, steps, steps_by_level,
 ):  # fmt: skip
     """March rays (N, 3) through planes (cells, 3); outputs (N,), steps_by_level (workers, L)."""
@@ -144,7 +144,7 @@ def march(
         while first < n:
             march_chunk(
                 first, min(n, first + CHUNK), origin, direction, ray_pixel, t_near, t_far,
-                prim_id, data, offsets, widths, m, eye, near, samples, max_steps,
+                prim_id, data, offsets, pitches, m, eye, near, samples, max_steps,
                 status, resolved, pixel, prim, t, t_free, steps, steps_by_level[worker],
             )  # fmt: skip
             first = fetch_add(taken.ctypes.data, CHUNK)

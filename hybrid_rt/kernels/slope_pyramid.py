@@ -23,11 +23,11 @@ def least_offset(a, bx, by, out_x, out_y, half, slope_x, slope_y):
 
 
 @kernel
-def bound_row(data, y, source, width, height, target, wide, side):
+def bound_row(data, y, source, pitch, width, height, target, wide_pitch, wide, side):
     """Make row y of the level at `target` from the level (height, width) at `source`.
 
-    `side` is the length of a child's square in pixels. An empty child is a plane at minus infinity
-    and asks for nothing.
+    Rows lie `pitch` and `wide_pitch` cells apart. `side` is the length of a child's square in
+    pixels. An empty child is a plane at minus infinity and asks for nothing.
     """
     half = 0.5 * side
     end_y = min(2 * y + 2, height)
@@ -36,7 +36,7 @@ def bound_row(data, y, source, width, height, target, wide, side):
         count, mean_x, mean_y = 0, 0.0, 0.0
         for j in range(2 * y, end_y):
             for i in range(2 * x, end_x):
-                row = source + j * width + i
+                row = source + j * pitch + i
                 count += data[row, 0] > -np.inf
                 mean_x += np.float64(data[row, 1])
                 mean_y += np.float64(data[row, 2])
@@ -47,14 +47,14 @@ def bound_row(data, y, source, width, height, target, wide, side):
         tilted, flat = -math.inf, -math.inf
         for j in range(2 * y, end_y):
             for i in range(2 * x, end_x):
-                row = source + j * width + i
+                row = source + j * pitch + i
                 a = np.float64(data[row, 0])
                 bx, by = np.float64(data[row, 1]), np.float64(data[row, 2])
                 out_x, out_y = (i - 2 * x - 0.5) * side, (j - 2 * y - 0.5) * side
                 sx, sy = np.float64(slope_x), np.float64(slope_y)
                 tilted = max(tilted, least_offset(a, bx, by, out_x, out_y, half, sx, sy))
                 flat = max(flat, least_offset(a, bx, by, out_x, out_y, half, 0.0, 0.0))
-        cell = target + y * wide + x
+        cell = target + y * wide_pitch + x
         if tilted < flat:
             data[cell, 0] = rounded_up(tilted)
             data[cell, 1] = slope_x
@@ -75,15 +75,15 @@ def rounded_up(value):
 
 
 @parallel_kernel
-def build(depth, ddx, ddy, offsets, widths, heights, data):
+def build(depth, ddx, ddy, offsets, pitches, widths, heights, data):
     """Fill data (cells, 3) float32 with all levels of depth, ddx, ddy (H, W) float32.
 
-    offsets, widths, heights (L,) int64.
+    offsets, pitches, widths, heights (L,) int64.
     """
     height, width = depth.shape
     for y in prange(height):
         for x in range(width):
-            row = y * width + x
+            row = offsets[0] + y * pitches[0] + x
             seen = depth[y, x] > 0.0
             data[row, 0] = depth[y, x] if seen else -np.inf
             data[row, 1] = ddx[y, x] if seen else 0.0
@@ -91,6 +91,7 @@ def build(depth, ddx, ddy, offsets, widths, heights, data):
     for level in range(1, len(offsets)):
         for y in prange(heights[level]):
             bound_row(
-                data, y, offsets[level - 1], widths[level - 1], heights[level - 1],
-                offsets[level], widths[level], float(1 << (level - 1)),
+                data, y, offsets[level - 1], pitches[level - 1], widths[level - 1],
+                heights[level - 1], offsets[level], pitches[level], widths[level],
+                float(1 << (level - 1)),
             )  # fmt: skip

@@ -3,11 +3,21 @@
 from fractions import Fraction
 
 import numpy as np
+import pytest
 
 import hybrid_rt as hrt
 from hybrid_rt.kernels import certified as kernels
 
 S = hrt.MarchStatus
+
+
+@pytest.fixture(params=["vectors", "one by one"], autouse=True)
+def kernel(request, monkeypatch):
+    """Run every test with either kernel."""
+    if request.param == "one by one":
+        monkeypatch.setattr("hybrid_rt.certified._countable", lambda *_: False)
+
+
 F = np.float32
 
 

@@ -10,6 +10,13 @@ from unit.test_lists import random_scene
 S = hrt.MarchStatus
 
 
+@pytest.fixture(params=["vectors", "one by one"], autouse=True)
+def kernel(request, monkeypatch):
+    """Run every test with either kernel."""
+    if request.param == "one by one":
+        monkeypatch.setattr("hybrid_rt.certified._countable", lambda *_: False)
+
+
 def prepare(scene, camera, lists=4):
     gbuffer = hrt.rasterize(scene, camera, lists=lists)
     return gbuffer, hrt.build_depth_pyramid(gbuffer, conservative=True)
@@ -266,6 +273,11 @@ def test_a_conservative_pyramid_is_not_the_papers():
         ({"max_tests": 0}, "max_tests"),
         ({"max_steps": 0}, "max_steps"),
         ({"hand_over": 1}, "hand_o"),
+        ({"probes": 3}, "probes: expected one of 1, 2, 4, 8, 16"),
+        ({"probes": 2.0}, "probes"),
+        ({"probes": 32}, "probes"),
+        ({"vectors": 1}, "vectors"),
+        ({"vectors": False, "probes": 8}, "probes: expected 16 where vectors=False"),
     ],
 )
 def test_bad_parameters(parameters, argument):

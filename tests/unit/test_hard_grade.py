@@ -24,7 +24,7 @@ def small_case(directions):
 
 def marched(prim_id, t, resolved=None, t_free=None, pixel=None):
     n = len(prim_id)
-    answers = hrt.Marched.unfilled(n, 1)
+    answers = hrt.Marched.unfilled(n)
     answers.status[:] = hrt.MarchStatus.HIT
     answers.resolved[:] = True if resolved is None else resolved
     answers.prim_id[:] = prim_id

@@ -89,7 +89,7 @@ def test_every_answer_goes_to_its_own_ray(room):
     direction = np.column_stack([np.arange(n), np.ones(n), np.ones(n)])
     rays = hrt.Rays.from_arrays(rng.normal(size=(n, 3)), direction)
     resolved, prim = rng.random(n) < 0.4, rng.integers(-1, 1, n).astype(np.int32)
-    marched = hrt.Marched.unfilled(n, 1)
+    marched = hrt.Marched.unfilled(n)
     marched.resolved[:], marched.prim_id[:] = resolved, prim
     tracer = Counting()
     with pytest.MonkeyPatch.context() as patch:
