@@ -223,13 +223,8 @@ def apart(planes, prim, s, s_exit, x0, y0, z0, sx, sy, sz, z_error):
 @inlined
 def walk(
     i, origin, direction, ray, t_near, t_far, status, x, y, depth, dx, dy, dz, s_end, z, gz,
-<<<<<<< HEAD
-    prim_id, nearest, rest, planes, cells, offsets, widths, vertices, faces, max_steps, max_tests,
-    any_hit, steps_by_level,
-=======
     prim_id, nearest, rest, planes, cells, offsets, pitches, vertices, faces,
     max_steps, max_tests, any_hit, steps_by_level,
->>>>>>> integrate
 ):  # fmt: skip
     """March one ray; return (status, pixel x, pixel y, prim, t, s proven free, steps, tests)."""
     height, width, length = prim_id.shape

@@ -3,9 +3,9 @@
 A *batch* of rays is set up into rows of plain arrays, *slots*. Its rays then go from queue to
 queue: `step` walks what is ready, a ray in each lane, until something may be in the ray's way;
 `look` goes through the list of the pixel that it has come to; `test` intersects it with a
-primitive. Queues hold slots, so that each stage finds its lanes full, whatever other rays do. A lane
-of `step` whose ray has left is given the next one, once a few are free. At last the results of a
-batch are written to the rows of the outputs.
+primitive. Queues hold slots, so that each stage finds its lanes full, whatever other rays do. A
+lane of `step` whose ray has left is given the next one, once a few are free. At last the results of
+a batch are written to the rows of the outputs.
 
 Every lane computes what `hybrid_rt.kernels.certified` computes, operation by operation, so both
 have the same answers, ray for ray and step for step; there are the reasons and the error bounds.

@@ -243,19 +243,11 @@ SLOPE_X, SLOPE_Y, DEPTH, REFERENCE_X, REFERENCE_Y, ERROR, PLANE_ROW = 0, 1, 2, 3
 
 @parallel_kernel
 def face_planes(vertices, faces, eye, m, frame, near, width, height, margin, chunk, planes):
-<<<<<<< HEAD
-    """Write the depth planes of faces that may touch a pixel to planes (F, PLANE_ROW) float32.
-
-    In the grown pixels of the face's box, and for a place (x, y) that is off by no more than half
-    of the margin, ``DEPTH + SLOPE_X (x - REFERENCE_X) + SLOPE_Y (y - REFERENCE_Y)`` in float32 errs
-    by less than ERROR. Faces seen edge-on, or beside the screen, have NaN.
-=======
     """Write float32 depth planes (F, PLANE_ROW) of all faces that may touch a pixel.
 
     In the grown pixels of the face's box, and for a place (x, y) that is off by no more than half
     of the margin, ``DEPTH + SLOPE_X (x - REFERENCE_X) + SLOPE_Y (y - REFERENCE_Y)`` in float32 errs
     by less than ERROR. Faces seen edge-on, or beside the screen, have NaN.
->>>>>>> integrate
     """
     for c in prange(-(-len(faces) // chunk)):
         setup = np.empty(SETUP, np.float64)
