@@ -23,6 +23,7 @@ from hybrid_rt_bench.spec_base import (
     SceneEntry,
     SceneExperiment,
 )
+from hybrid_rt_bench.spec_peers import PeersExperiment
 from hybrid_rt_bench.spec_stability import StabilityExperiment
 
 __all__ = [
@@ -74,6 +75,7 @@ KINDS: dict[str, type[AnyExperiment]] = {
     "paper": Experiment,
     "error": ErrorExperiment,
     "stability": StabilityExperiment,
+    "peers": PeersExperiment,
 }
 """The class of each kind of experiment."""
 

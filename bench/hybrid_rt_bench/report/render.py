@@ -7,7 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hybrid_rt_bench.report import error_maps, error_tables, figures, pareto, pictures, stability
+from hybrid_rt_bench.report import (
+    error_maps,
+    error_tables,
+    figures,
+    pareto,
+    peers,
+    pictures,
+    stability,
+)
 from hybrid_rt_bench.report.table import Table
 from hybrid_rt_bench.report.tables import all_tables
 from hybrid_rt_bench.results import ReportsError, RunData, write_bytes
@@ -33,6 +41,7 @@ FORMS = {
     "paper": Form(all_tables, (figures.plots, pictures.figures)),
     "error": Form(error_tables.all_tables, (pareto.plots, error_maps.figures)),
     "stability": Form(stability.tables, (stability.figures,)),
+    "peers": Form(peers.tables, (peers.figures,)),
 }
 """The form of each kind of run."""
 
