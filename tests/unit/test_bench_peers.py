@@ -485,5 +485,10 @@ def test_a_real_peer_agrees_with_ours(name, cornell):
         answers = query.answers(query.run())
         assert len(answers.t) == len(answers.prim_id) == len(hrt.mirror_rays(gbuffer))
         assert (answers.prim_id >= 0).mean() > 0.5
+        outside = scene.bounds[1:] + scene.diagonal
+        none = opened.load(View("none", hrt.Rays.from_arrays(outside, outside - scene.bounds[:1])))
+        missed = none.answers(none.run())
+        assert missed.prim_id.tolist() == [-1]
+        assert missed.t[0] == np.inf or name == "trimesh-first"
     finally:
         opened.close()

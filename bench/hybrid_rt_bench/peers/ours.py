@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import functools
 import time
+from typing import Any
+
+import numpy as np
 
 import hybrid_rt as hrt
 from hybrid_rt.certified import LENGTH
@@ -100,8 +103,9 @@ class EmbreexRun(Opened):
         """Return the query; embreex takes float32 arrays as ours are."""
         origin, direction = view.rays.origin, view.rays.direction
 
-        def answers(found: dict[str, object]) -> Answers:
-            return Answers(found["tfar"], found["primID"])  # type: ignore[arg-type]
+        def answers(found: dict[str, Any]) -> Answers:
+            prim_id = found["primID"]
+            return Answers(np.where(prim_id >= 0, found["tfar"], np.inf), prim_id)
 
         return Query(lambda: self._scene.run(origin, direction, output=True), answers)
 

@@ -43,8 +43,8 @@ class TrimeshLocation(_Trimesh):
         direction = view.rays.direction.astype(np.float64)
 
         def answers(found: Any) -> Answers:
-            place, ray, triangle = found
-            d = direction[ray]
+            place, ray, triangle = (np.asarray(part) for part in found)
+            place, d = place.reshape(-1, 3), direction[ray]  # of no hits, it is of shape (0,)
             t = ((place - origin[ray]) * d).sum(axis=1) / (d * d).sum(axis=1)
             return answers_of(len(origin), ray, t, triangle)
 
