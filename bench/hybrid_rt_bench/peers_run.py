@@ -185,7 +185,7 @@ def _said(results: list[dict[str, Any]]) -> str:
         for row in results
         if row["workload"] == "mirror" and row["state"] == "ok"
     ]
-    return "Mrays/s of mirror rays: " + ", ".join(rates)
+    return "Mrays/s of mirror rays: " + ", ".join(rates) if rates else "done"
 
 
 def _compile(chosen: list[Peer], threads: int) -> dict[str, float]:

@@ -458,7 +458,7 @@ def test_a_real_peer_agrees_with_ours(name, cornell):
     for module in REAL[name]:
         if importlib.util.find_spec(module) is None:
             pytest.skip(f"{module} is not installed (pip install '.[peers]')")
-    scene, _, gbuffer = cornell
+    scene, camera, gbuffer = cornell
     peer = peers.get_peer(name)
     tried = trial.attempt(peer, scene, 1, 120)
     if tried.reason:
@@ -473,6 +473,11 @@ def test_a_real_peer_agrees_with_ours(name, cornell):
             assert row["same"] > 0.998
             assert row["depth_p99"] < 1e-5
             assert row["read_ms"] > 0
+            other = dataclasses.replace(camera, width=80, height=40)  # after the first
+            drawing = opened.draw(other)
+            drawing.draw()
+            ours = hrt.rasterize(scene, other)
+            assert agreement.of_pictures(drawing.read(), ours)["same"] > 0.998
             return
         for workload in ("mirror", "primary"):
             row = row_of(record, name, workload)

@@ -14,7 +14,7 @@ PEERS = {
     for peer in (
         Peer(EMBREE, "The strongest path of ours through Embree", ("embreex",), ours.Embree),
         Peer(
-            "hybrid", "Our march in mode certified, then the strongest Embree", ("hybrid-rt",),
+            "hybrid", "Our march in mode certified, then the strongest Embree", (),
             ours.Hybrid, alone=False,
         ),
         Peer("embreex", "EmbreeScene.run as it is, one thread", ("embreex",), ours.EmbreexRun),
@@ -40,7 +40,7 @@ PEERS = {
             trimesh_ray.TrimeshRtree, sampled=True,
         ),
         Peer(
-            RASTER, "hybrid_rt.rasterize: depth, its derivatives, primitives", ("hybrid-rt",),
+            RASTER, "hybrid_rt.rasterize: depth, its derivatives, primitives", (),
             ours.Raster, raster=True, alone=False,
         ),
         Peer(

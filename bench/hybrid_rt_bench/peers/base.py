@@ -153,7 +153,7 @@ class Peer:
     name : str
     description : str
     packages : tuple of str
-        Distributions whose versions are told.
+        Distributions whose versions are told; none for what is ours.
     open : callable
         Takes a scene and a number of threads; raises whatever keeps the peer from running.
     raster : bool
@@ -176,7 +176,9 @@ class Peer:
     @property
     def version(self) -> str:
         """The versions of its packages, without importing any."""
-        return ", ".join(f"{name} {version_of(name)}" for name in self.packages)
+        return ", ".join(f"{name} {version_of(name)}" for name in self.packages) or (
+            f"hybrid-rt {hrt.__version__}"
+        )
 
 
 def joined(rays: hrt.Rays) -> NDArray[np.float32]:

@@ -97,15 +97,15 @@ class Llvmpipe(Opened):
         """Return the drawing of a camera: clear, one draw call, glFinish; then glReadPixels."""
         gl, context = self._gl, self._context
         width, height = camera.width, camera.height
-        self._release_frame()
         color = context.texture((width, height), 1, dtype="i4")
         frame = context.framebuffer([color])
+        frame.use()
+        self._release_frame()  # not sooner: moderngl binds again what was bound before
         depth = _U()
         self._frame = (frame, color, depth)
         gl["glGenTextures"](1, ctypes.byref(depth))
         gl["glBindTexture"](TEXTURE_2D, depth)
         gl["glTexStorage2D"](TEXTURE_2D, 1, DEPTH_COMPONENT32F, width, height)
-        frame.use()
         gl["glFramebufferTexture2D"](FRAMEBUFFER, DEPTH_ATTACHMENT, TEXTURE_2D, depth, 0)
         gl["glClipControl"](LOWER_LEFT, ZERO_TO_ONE)
         frame.depth_mask = True  # moderngl does not know of the depth buffer
@@ -117,8 +117,9 @@ class Llvmpipe(Opened):
         picture = Picture(
             np.empty((height, width), np.float32), np.empty((height, width), np.int32)
         )
-        if context.error != "GL_NO_ERROR":
-            raise PeerError(f"OpenGL refuses the frame buffer: {context.error}")
+        error = context.error  # asking for it clears it
+        if error != "GL_NO_ERROR":
+            raise PeerError(f"OpenGL refuses the frame buffer: {error}")
 
         def draw() -> None:
             frame.use()
