@@ -25,8 +25,8 @@ from hybrid_rt_bench.primary import primary_rays
 from hybrid_rt_bench.results import PEER_TIMES, ReportsError
 from hybrid_rt_bench.run import reason_of
 
-PROBE = 32
-"""Rays that a peer traces to find out how many it can be given, where it is sampled."""
+MORE = 4
+"""By how many times a sampled peer's rays grow until it takes long enough to know its rate."""
 
 Row = dict[str, Any]
 
@@ -308,17 +308,28 @@ def _timing_columns(rays: int, samples: list[Row]) -> Row:
 
 
 def _sample(opened: Opened, view: View, seconds: float) -> Any:
-    """Return the indices of about as many rays, spread over the view, as take `seconds`."""
-    n = len(view.rays)
-    few = np.linspace(0, n - 1, min(n, PROBE)).astype(np.int64)
-    query = opened.load(dataclasses.replace(view, rays=view.rays.take(few)))
-    if query is None:
-        return few
-    query.run()
-    start = time.perf_counter()
-    query.run()
-    took = time.perf_counter() - start
-    return np.linspace(0, n - 1, min(n, max(PROBE, int(PROBE * seconds / took)))).astype(np.int64)
+    """Return the indices of about as many rays, spread over the view, as take `seconds`.
+
+    It begins with one ray: a peer may need a second for each.
+    """
+    rays, count = view.rays, 1
+    while True:
+        query = opened.load(dataclasses.replace(view, rays=rays.take(_spread(len(rays), count))))
+        if query is None:
+            break
+        start = time.perf_counter()
+        query.run()
+        took = time.perf_counter() - start
+        if count == len(rays) or took * MORE >= seconds:
+            count = max(1, min(len(rays), int(count * seconds / took)))
+            break
+        count = min(len(rays), count * MORE)
+    return _spread(len(rays), count)
+
+
+def _spread(n: int, count: int) -> Any:
+    """Return `count` of `n` indices, evenly spread, none at an end."""
+    return ((np.arange(count) + 0.5) * n / count).astype(np.int64)
 
 
 def _take(hits: hrt.Hits, index: Any) -> hrt.Hits:

@@ -5,6 +5,7 @@ import importlib
 import json
 import math
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -215,15 +216,64 @@ def test_every_sample_is_paired_and_gives_its_row(cornell):
     assert (row["same"], row["different"], row["t_max"]) == (1.0, 0, 0.0)
 
 
-def test_a_sampled_peer_gets_some_of_the_rays_and_its_ratio_is_a_ray(cornell):
-    opened = Fake(cornell[0], 1)
-    record = measured(cornell, Contender(fake_peer(sampled=True), opened), rounds=1)
+def test_a_sampled_peer_gets_as_many_rays_as_the_time_allows_and_its_ratio_is_a_ray(
+    cornell, monkeypatch
+):
+    """Its clock says that a ray takes a hundredth of the time it may have."""
+
+    class Slow(Fake):
+        def load(self, view):
+            query = super().load(view)
+
+            def trace():
+                clock.now += 5e-4 * len(view.rays)
+                return query.run()
+
+            return dataclasses.replace(query, run=trace)
+
+    class Clock:
+        now = 0.0
+
+        def perf_counter(self):
+            self.now += 1e-9
+            return self.now
+
+        def process_time(self):
+            return self.now
+
+    clock = Clock()
+    monkeypatch.setattr(peers_cell, "time", clock)
+    opened = Slow(cornell[0], 1)
+    contender = Contender(fake_peer(sampled=True), opened)
+    record = measured(cornell, contender, rounds=1)
     row = row_of(record, "fake")
-    assert opened.asked[0] == peers_cell.PROBE
-    assert row["rays"] == opened.asked[1] <= record.details["mirror_rays"]
+    assert opened.asked[:5] == [1, 4, 16, 64, row["rays"]]  # 64 take 0.032 s of 0.05 s
+    assert row["rays"] == pytest.approx(100, abs=1)
+    assert row["sampled"]
+    assert row["same"] == 1.0
     (sample,) = (s for s in record.samples if s["workload"] == "mirror")
     a_ray = sample["beside"] / record.details["mirror_rays"]
     assert row["ratio"] == pytest.approx(sample["seconds"] / row["rays"] / a_ray)
+
+
+def test_a_sample_of_a_peer_that_is_far_too_slow_is_one_ray(cornell, monkeypatch):
+    class Slower(Fake):
+        def load(self, view):
+            query = super().load(view)
+
+            def trace():
+                clock[0] += 10.0 * len(view.rays)
+                return query.run()
+
+            return dataclasses.replace(query, run=trace)
+
+    clock = [0.0]
+    opened = Slower(cornell[0], 1)
+    view = View("mirror", hrt.mirror_rays(cornell[2]), cornell[2])
+    monkeypatch.setattr(peers_cell, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
+    (index,) = peers_cell._sample(opened, view, 1.0)
+    assert 0 < index < len(view.rays)
+    assert opened.asked == [1]
 
 
 def hits_at(t, prim_id):
