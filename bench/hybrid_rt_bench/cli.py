@@ -118,6 +118,8 @@ def run(
     * `hybrid-rt run stability` - the hard set: which technique answers wrongly on which case
 
     * `hybrid-rt run scaling --series triangles --triangles 2^10..2^20` - growth over one axis
+
+    * `hybrid-rt run peers --quick` - the same rays and pictures through other programs
     """
     from hybrid_rt_bench.kinds import RUNNERS
     from hybrid_rt_bench.progress import Reporter
@@ -207,8 +209,9 @@ def compare(
 
 @app.command("list")
 def list_() -> None:
-    """List scenes with their cameras, experiments, techniques and workloads."""
+    """List scenes with their cameras, experiments, techniques, workloads and peers."""
     import hybrid_rt_scenes as hrs
+    from hybrid_rt_bench.peers import PEERS
     from hybrid_rt_bench.techniques import TECHNIQUES
     from hybrid_rt_bench.workloads import WORKLOADS
 
@@ -242,6 +245,12 @@ def list_() -> None:
     table = RichTable("workload", "which rays", title="Workloads", title_justify="left")
     for workload in WORKLOADS.values():
         table.add_row(workload.name, workload.description)
+    out.print(table)
+    table = RichTable(
+        "peer", "version", "what is called", title="Programs for `run peers`", title_justify="left"
+    )
+    for peer in PEERS.values():
+        table.add_row(peer.name, peer.version, peer.description)
     out.print(table)
     out.print("Thickness is a share of the diagonal of the scene's bounding box.")
 

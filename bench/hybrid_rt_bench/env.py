@@ -15,6 +15,9 @@ import psutil
 import hybrid_rt as hrt
 
 PACKAGES = ("numba", "llvmlite", "numpy", "scipy", "pandas", "pyarrow", "trimesh", "embreex")
+PEER_PACKAGES = ("mitsuba", "drjit", "open3d", "moderngl", "rtree")
+"""What `hybrid-rt run peers` can compare with, each optional."""
+
 BUSY = 0.25
 """A load average above this share of the cores is called busy."""
 
@@ -28,6 +31,7 @@ def describe(threads: int) -> dict[str, Any]:
         "hybrid_rt": hrt.__version__,
         "python": platform.python_version(),
         "packages": {name: importlib.metadata.version(name) for name in PACKAGES},
+        "peers": {name: version_of(name) for name in PEER_PACKAGES},
         "os": platform.platform(),
         "cpu": _cpu_model(),
         "cores": psutil.cpu_count(logical=False) or psutil.cpu_count() or 1,
@@ -132,6 +136,14 @@ def git_commit() -> str | None:
         return git("rev-parse", "HEAD") + dirty
     except (OSError, subprocess.SubprocessError):
         return None
+
+
+def version_of(package: str) -> str:
+    """Return the version of an installed distribution, or "not installed"."""
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"
 
 
 def _cpu_model() -> str:

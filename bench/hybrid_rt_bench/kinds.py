@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hybrid_rt_bench.error_run import run_error
+from hybrid_rt_bench.peers_run import run_peers
 from hybrid_rt_bench.run import Outcome, run_experiment
 from hybrid_rt_bench.scaling_run import run_scaling
 from hybrid_rt_bench.stability import run_stability
@@ -16,6 +17,7 @@ RUNNERS: dict[str, Runner] = {
     "error": run_error,
     "stability": run_stability,
     "scaling": run_scaling,
+    "peers": run_peers,
 }
 """What runs an experiment of each kind of `hybrid_rt_bench.spec.KINDS`.
 

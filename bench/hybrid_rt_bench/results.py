@@ -52,6 +52,11 @@ STAGES: dict[str, str] = {
 HYBRID_STAGES = ("march", "compaction", "fallback", "merge")
 """The stages whose sum is the time of the hybrid."""
 
+PEER_TIMES = (
+    "ms", "ms_low", "ms_high", "cores", "ratio", "ratio_low", "ratio_high",
+)  # fmt: skip
+"""Columns for the timings of a peer; NaN where it was not timed."""
+
 PIXEL_CLASSES = {"background": 0, "right": 1, "unresolved": 2, "wrong": 3}
 """What the pixels of a stored picture say."""
 

@@ -23,6 +23,7 @@ from hybrid_rt_bench.spec_base import (
     SceneEntry,
     SceneExperiment,
 )
+from hybrid_rt_bench.spec_peers import PeersExperiment
 from hybrid_rt_bench.spec_scaling import ScalingExperiment
 from hybrid_rt_bench.spec_stability import StabilityExperiment
 
@@ -76,6 +77,7 @@ KINDS: dict[str, type[AnyExperiment]] = {
     "error": ErrorExperiment,
     "stability": StabilityExperiment,
     "scaling": ScalingExperiment,
+    "peers": PeersExperiment,
 }
 """The class of each kind of experiment."""
 

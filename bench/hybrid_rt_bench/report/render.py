@@ -12,6 +12,7 @@ from hybrid_rt_bench.report import (
     error_tables,
     figures,
     pareto,
+    peers,
     pictures,
     scaling,
     scaling_figures,
@@ -43,6 +44,7 @@ FORMS = {
     "error": Form(error_tables.all_tables, (pareto.plots, error_maps.figures)),
     "stability": Form(stability.tables, (stability.figures,)),
     "scaling": Form(scaling.tables, (scaling_figures.plots,)),
+    "peers": Form(peers.tables, (peers.figures,)),
 }
 """The form of each kind of run."""
 
