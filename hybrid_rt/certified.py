@@ -18,6 +18,7 @@ from hybrid_rt.types import F64, Camera, DepthPyramid, GBuffer, Marched, Primiti
 
 LENGTH = 8
 """Length of the lists that are made where a G-buffer has none."""
+LARGEST_INDEX = 2**31 - 1
 
 
 def march(
@@ -53,7 +54,7 @@ def march(
 def _countable(rays: Rays, lists: PrimitiveLists, pyramid: DepthPyramid) -> bool:
     """Can the lanes, which are int32, index every array. A face has 9 coordinates of corners."""
     sizes = 3 * len(rays), lists.prim_id.size, 9 * len(lists.planes), pyramid.data.size
-    return max(sizes) < 2**31
+    return max(sizes) <= LARGEST_INDEX
 
 
 def _in_lanes(

@@ -78,7 +78,8 @@ class Certified:
     vectors : bool
         Whether rays are marched in the lanes of vectors, several at a time. The answers are the
         same, bit for bit, without; steps are then counted by level too. Without, `probes` must
-        be 16.
+        be 16. More than 2**31 numbers in an array, of rays, lists or triangles, are too many for
+        the lanes: then all rays are marched without.
     """
 
     max_tests: int = 64

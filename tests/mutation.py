@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 LISTS, WALK = "hybrid_rt/kernels/lists.py", "hybrid_rt/kernels/certified.py"
 TEST_LISTS, TEST_WALK = "tests/unit/test_lists.py", "tests/unit/test_certified.py"
 ROUNDING, HYBRID = "tests/numerics/test_certified_rounding.py", "tests/unit/test_hybrid.py"
+LANES, PLANES = "tests/unit/test_certified_simd.py", "tests/numerics/test_planes.py"
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,17 @@ MUTANTS = (
     Mutant("more said to be free than is", WALK,
            "return HIDDEN, -1, -1, -1, math.inf, s / scale, steps, tests",
            "return HIDDEN, -1, -1, -1, math.inf, end / scale, steps, tests", TEST_WALK),
+    Mutant("plane without error", WALK, "front = min(above, then) > error",
+           "front = min(above, then) > F0", PLANES),
+    Mutant("behind without the error of the ray", WALK,
+           "behind = max(above, then) + z_error < -error", "behind = max(above, then) < -error",
+           PLANES),
+    Mutant("plane looked at in one end only", WALK, "front = min(above, then) > error",
+           "front = above > error", PLANES),
+    Mutant("errors of planes not counted", LISTS, "(abs(a) + abs(b)) * margin + setup[PLANE + 3] / d",
+           "setup[PLANE + 3] / d", PLANES),
+    Mutant("skipped rays taken for free", "hybrid_rt/kernels/certified_simd.py",
+           "unmarched(i, SKIPPED, F(0.0), out)", "unmarched(i, MISS, F(0.0), out)", LANES),
     Mutant("handed over behind what is free", "hybrid_rt/kernels/hybrid.py",
            "HAND_OVER_BACK = 1.0 - 2.0**-8", "HAND_OVER_BACK = 1.5", HYBRID),
 )  # fmt: skip

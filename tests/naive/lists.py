@@ -48,6 +48,20 @@ def nearest_depth(triangle, near, x0, y0, x1, y1):
     return max(near / q[2] for q in polygon)
 
 
+def plane_depth(triangle, near, x, y):
+    """Return the exact depth of a projected triangle's plane at a place, None if it has none.
+
+    A point of the plane is q = z (x, y, 1) with n . q = n . q_a, so its depth is
+    near (n . (x, y, 1)) / (n . q_a).
+    """
+    a, b, c = triangle
+    n = cross(sub(b, a), sub(c, a))
+    below = sum(n[k] * a[k] for k in range(3))
+    if below == 0:
+        return None
+    return Fraction(near) * (n[0] * Fraction(x) + n[1] * Fraction(y) + n[2]) / below
+
+
 def has_area(triangle):
     a, b, c = triangle
     return any(cross(sub(b, a), sub(c, a)))

@@ -116,10 +116,12 @@ def certain():
     return scene, buffer, rays, pyramid, hrt.EmbreeTracer(scene)
 
 
-@pytest.mark.parametrize("hand_over", [False, True])
-def test_certified_is_the_tracer_ties_apart(certain, hand_over):
+@pytest.mark.parametrize(
+    "parameters", [{"hand_over": False}, {"hand_over": True}, {"probes": 2}, {"vectors": False}]
+)
+def test_certified_is_the_tracer_ties_apart(certain, parameters):
     scene, buffer, rays, pyramid, tracer = certain
-    result = hrt.trace_hybrid(rays, buffer, pyramid, tracer, hrt.Certified(hand_over=hand_over))
+    result = hrt.trace_hybrid(rays, buffer, pyramid, tracer, hrt.Certified(**parameters))
     assert 0.2 < result.resolved.mean() < 0.95
     reference = tracer.intersect(rays)
     everything = np.ones(len(rays), bool)
@@ -130,6 +132,31 @@ def test_certified_is_the_tracer_ties_apart(certain, hand_over):
     same = result.hits.prim_id == reference.prim_id
     np.testing.assert_allclose(result.hits.t[same], reference.t[same], rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(result.hits.u[same], reference.u[same], atol=1e-3)
+
+
+class OnlyIntersects:
+    """A tracer that takes no indices."""
+
+    def __init__(self, tracer):
+        self.intersect = tracer.intersect
+
+
+@pytest.mark.parametrize("mode", ["paper", hrt.Certified(probes=4), hrt.Certified()])
+def test_a_tracer_that_writes_in_place_and_one_that_does_not_give_the_same(
+    case, certain, mode, monkeypatch
+):
+    _scene, buffer, rays, pyramid, tracer = case if mode == "paper" else certain
+    slow = hrt.trace_hybrid(rays, buffer, pyramid, OnlyIntersects(tracer), mode)
+
+    def no_copy(rays, index):
+        raise AssertionError("rays were copied")
+
+    monkeypatch.setattr(hrt.Rays, "take", no_copy)
+    fast = hrt.trace_hybrid(rays, buffer, pyramid, tracer, mode)
+    assert 0.1 < fast.resolved.mean() < 0.95
+    for name in ("t", "prim_id", "u", "v", "n_g"):
+        np.testing.assert_array_equal(getattr(fast.hits, name), getattr(slow.hits, name))
+    assert (fast.marched.prim_id[~fast.resolved] == -1).all()
 
 
 def test_hand_over_starts_rays_later_and_before_their_hit(certain):
