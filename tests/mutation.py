@@ -81,7 +81,8 @@ MUTANTS = (
     Mutant("planes without the margin", LISTS,
            "(abs(a) + abs(b)) * margin + setup[PLANE + 3] / d", "setup[PLANE + 3] / d", PLANES),
     Mutant("skipped rays taken for free", "hybrid_rt/kernels/certified_simd.py",
-           "unmarched(i, SKIPPED, F(0.0), out)", "unmarched(i, MISS, F(0.0), out)", LANES),
+           "unmarched(i, SKIPPED, F32(0.0), out)", "unmarched(i, MISS, F32(0.0), out)",
+           LANES),
     Mutant("handed over behind what is free", "hybrid_rt/kernels/hybrid.py",
            "HAND_OVER_BACK = 1.0 - 2.0**-8", "HAND_OVER_BACK = 1.5", HYBRID),
 )  # fmt: skip
