@@ -6,6 +6,7 @@ import numpy as np
 
 from hybrid_rt import _threads
 from hybrid_rt.kernels import lists as kernels
+from hybrid_rt.kernels import lists_bins as bin_kernels
 from hybrid_rt.kernels.raster import prefix_sums
 from hybrid_rt.types import Camera, PrimitiveLists, Scene
 
@@ -14,7 +15,6 @@ MARGIN_ULPS = 16
 BATCH_FACES = 1 << 21
 BATCH_ENTRIES = 1 << 26
 CHUNKS = 64
-CHUNK_FACES = 1024
 
 
 def primitive_lists(
@@ -26,45 +26,58 @@ def primitive_lists(
     """
     width, height, near = camera.width, camera.height, float(camera.near)
     margin = MARGIN_ULPS * 2.0**-24 * (max(width, height) + 1)
-    prim_id = np.full((height, width, length), -1, np.int32)
-    nearest = np.zeros((height, width, length), np.float32)
-    rest = np.zeros((height, width), np.float32)
+    prim_id = np.empty((height, width, length), np.int32)
+    nearest = np.empty((height, width, length), np.float32)
+    rest = np.empty((height, width), np.float32)
     vertices, faces = scene.vertices, scene.faces
+    planes = np.zeros((len(faces), kernels.PLANE_ROW), np.float32)
     eye = np.array(camera.eye, np.float64)
     m, frame = camera.pixel_from_world, camera.world_from_pixel
-    tiles_x = -(-width // kernels.TILE)
-    tiles = tiles_x * -(-height // kernels.TILE)
-    with _threads.limited(threads) as lanes:
+    tiles_x = -(-width // bin_kernels.TILE)
+    tiles = tiles_x * -(-height // bin_kernels.TILE)
+    boxes = np.empty(len(vertices), np.int64)
+    flags = np.empty(len(vertices), np.uint8)
+    nearest_of = np.empty(len(vertices), np.float32)
+    with _threads.limited(threads) as workers:
+        bin_kernels.box_vertices(
+            vertices.reshape(-1),
+            eye,
+            m,
+            near,
+            width,
+            height,
+            margin,
+            boxes,
+            flags,
+            nearest_of,
+        )
+        corners = boxes.view(np.int16).reshape(-1, 4)
         size = min(len(faces), BATCH_FACES)
         first = 0
         while first < len(faces):
             last = min(first + size, len(faces))
             chunk = -(-(last - first) // CHUNKS)
             chunks = -(-(last - first) // chunk)
-            cursors = np.zeros((chunks, tiles), np.int32)
-            place = (
-                vertices, faces, first, last, eye, m, near, width, height, margin, tiles_x, chunk,
+            survivors = np.empty(last - first, np.int32)
+            spans = np.empty((last - first, 4), np.int16)
+            nears = np.empty(last - first, np.float32)
+            n_survivors = np.empty(chunks, np.int32)
+            counts = np.empty((chunks, tiles), np.int32)
+            bin_kernels.cull_and_count(
+                faces, first, last, corners, flags, nearest_of, width, height, tiles_x, workers,
+                chunk, survivors, spans, nears, n_survivors, counts,
             )  # fmt: skip
-            kernels.bin_faces(*place, cursors, np.empty(0, np.int32))
-            entries = int(cursors.sum(dtype=np.int64))
+            entries = int(counts.sum(dtype=np.int64))
             if entries > BATCH_ENTRIES and size > 1:
                 size = -(-size // 2)
                 continue
             tile_start = np.empty(tiles + 1, np.int32)
-            prefix_sums(
-                np.zeros(chunks, np.int32), cursors, np.empty(chunks + 1, np.int32), tile_start
-            )
+            prefix_sums(n_survivors, counts, np.empty(chunks + 1, np.int32), tile_start)
             bins = np.empty(entries, np.int32)
-            if entries:
-                kernels.bin_faces(*place, cursors, bins)
+            bin_kernels.fill_bins(spans, n_survivors, tiles_x, workers, chunk, counts, bins)
             kernels.fill_lists(
-                vertices, faces, tile_start, bins, eye, m, frame, near, width, height, margin,
-                tiles_x, lanes, prim_id, nearest, rest,
+                vertices, faces, tile_start, bins, survivors, spans, nears, eye, m, frame, near,
+                width, height, margin, tiles_x, workers, first == 0, prim_id, nearest, rest, planes,
             )  # fmt: skip
             first = last
-    planes = np.empty((len(faces), kernels.PLANE_ROW), np.float32)
-    with _threads.limited(threads):
-        kernels.face_planes(
-            vertices, faces, eye, m, frame, near, width, height, margin, CHUNK_FACES, planes
-        )
     return PrimitiveLists(prim_id, nearest, rest, planes, margin)

@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 LISTS, WALK = "hybrid_rt/kernels/lists.py", "hybrid_rt/kernels/certified.py"
 TEST_LISTS, TEST_WALK = "tests/unit/test_lists.py", "tests/unit/test_certified.py"
 ROUNDING, HYBRID = "tests/numerics/test_certified_rounding.py", "tests/unit/test_hybrid.py"
+BINS = "hybrid_rt/kernels/lists_bins.py"
 LANES, PLANES = "tests/unit/test_certified_simd.py", "tests/numerics/test_planes.py"
 
 
@@ -36,19 +37,19 @@ MUTANTS = (
     Mutant("lists at pixel centres", LISTS, "half = 0.5 + margin", "half = 0.0", TEST_LISTS),
     Mutant("no margin", "hybrid_rt/lists.py", "MARGIN_ULPS = 16", "MARGIN_ULPS = 0", ROUNDING),
     Mutant(
-        "triangles across the near plane left out", LISTS,
+        "triangles across the near plane left out", BINS,
         "return True, 0, 0, width - 1, height - 1", "return False, 0, 0, 0, 0", TEST_LISTS,
     ),
     Mutant(
-        "bounds rounded to nearest", LISTS,
-        "np.float32(depth * (1.0 + 2.0**-22))", "np.float32(depth)", ROUNDING,
+        "bounds rounded to nearest", BINS,
+        "simd.to_f32(depth * (1.0 + 2.0**-22))", "simd.to_f32(depth)", ROUNDING,
     ),
     Mutant(
-        "nearest vertex forgotten to be clipped", LISTS,
-        "near / max(closest, near * (1.0 - NEAR_SLACK))", "near / max(a2, b2, c2)", TEST_LISTS,
+        "nearest vertex forgotten to be clipped", BINS,
+        "near / simd.maximum(q2 - e2, close)", "near / q2", TEST_LISTS,
     ),
     Mutant("what falls out of a list forgotten", LISTS,
-           "rest[at] = max(rest[at], bounds[at, k - 1])", "rest[at] = rest[at]", TEST_LISTS),
+           "k = min(n, length)", "k = min(n, length - 1)", TEST_LISTS),
     Mutant("rest not looked at", WALK, "if full and not lowest > rest[cy, cx]:",
            "if full and lowest < F0:", TEST_WALK),
     Mutant("only the first of a list tested", WALK,
@@ -79,7 +80,7 @@ MUTANTS = (
     Mutant("plane looked at in one end only", WALK, "front = min(above, then) > error",
            "front = above > error", PLANES),
     Mutant("planes without the margin", LISTS,
-           "(abs(a) + abs(b)) * margin + setup[PLANE + 3] / d", "setup[PLANE + 3] / d", PLANES),
+           "(steep_x + steep_y) * margin + reach", "reach", PLANES),
     Mutant("skipped rays taken for free", "hybrid_rt/kernels/certified_simd.py",
            "unmarched(i, SKIPPED, F32(0.0), out)", "unmarched(i, MISS, F32(0.0), out)",
            LANES),

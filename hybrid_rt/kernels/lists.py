@@ -30,15 +30,12 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+from hybrid_rt.kernels import simd
+from hybrid_rt.kernels._borrow import borrowed, keep
+from hybrid_rt.kernels._jit import inlined, parallel_kernel
+from hybrid_rt.kernels._queue import fetch_add
+from hybrid_rt.kernels.lists_bins import LANES, SLACK, TILE, TILE_BITS, round_up, row
 
-TILE_BITS = 5
-TILE = 1 << TILE_BITS
-
-SLACK = 2.0**-48
-"""Relative error of the sums above, 32 e."""
-NEAR_SLACK = 2.0**-20
-"""The near plane is moved to the eye by this, relative: a ray may end a rounding beyond it."""
 EDGE_ON = 1024.0
 """A plane whose distance from the eye is not certain to one part in a thousand has no slope."""
 CAP = 1.01
@@ -46,342 +43,463 @@ CAP = 1.01
 PLANE_ULPS = 16.0 * 2.0**-24
 """Error of a depth plane in float32, relative to the sizes of its terms: three roundings of what is
 stored, two of the differences, four of the sum, one of the comparison."""
-TINY = np.float32(1e-37)
-"""A bound that is not zero is at least this, where float32 still has all its digits."""
+# Rows of LANES float64 that a set-up fills, a lane for each face: three edges (A, B, C), the plane
+# (A, B, C), above which the plane's largest value over a square means nearer than the near plane
+# all over.
+PLANE, LIMIT, ROWS = 9, 12, 13
 
-COVER, ALL = 0, 1
-
-# Scratch of one triangle's set-up: three edges (A, B, C, slack), the plane's numerator (A, B, C,
-# slack), its denominator, the nearest depth of the vertices, twice the relative error of the
-# denominator.
-EDGES, PLANE, DENOMINATOR, NEAREST, LOWERED, SETUP = 0, 12, 16, 17, 18, 19
-
-
-@inlined
-def _relative(vertices, v, eye):
-    """Return vertex v relative to the eye, in world axes."""
-    return (
-        np.float64(vertices[v, 0]) - eye[0],
-        np.float64(vertices[v, 1]) - eye[1],
-        np.float64(vertices[v, 2]) - eye[2],
-    )
-
-
-@inlined
-def _edge(vertices, i, j):
-    """Return vertex j minus vertex i; float32 inputs, so that one rounding is all its error."""
-    return (
-        np.float64(vertices[j, 0]) - np.float64(vertices[i, 0]),
-        np.float64(vertices[j, 1]) - np.float64(vertices[i, 1]),
-        np.float64(vertices[j, 2]) - np.float64(vertices[i, 2]),
-    )
-
-
-@inlined
-def _equal(vertices, i, j):
-    """Are two vertices in the same place."""
-    return (
-        vertices[i, 0] == vertices[j, 0]
-        and vertices[i, 1] == vertices[j, 1]
-        and vertices[i, 2] == vertices[j, 2]
-    )
-
-
-@inlined
-def _row(m, k, x, y, z):
-    """Return (q_k, Q_k): row k of M times a vector, and the sum of its terms' sizes."""
-    a, b, c = m[k, 0] * x, m[k, 1] * y, m[k, 2] * z
-    return a + b + c, abs(a) + abs(b) + abs(c)
-
-
-@inlined
-def face_box(vertices, faces, face, eye, m, near, width, height, margin):
-    """Return (any, i0, j0, i1, j1): the grown pixels that the face may touch.
-
-    A face that crosses the near plane gets the whole screen, unless it lies beside it. One with two
-    equal corners is a line or a point and is never hit.
-    """
-    if (
-        _equal(vertices, faces[face, 0], faces[face, 1])
-        or _equal(vertices, faces[face, 1], faces[face, 2])
-        or _equal(vertices, faces[face, 2], faces[face, 0])
-    ):
-        return False, 0, 0, 0, 0
-    low_x = np.inf
-    low_y = np.inf
-    high_x = -np.inf
-    high_y = -np.inf
-    perhaps_front = 0
-    surely_front = 0
-    left, right, above, below = True, True, True, True
-    for k in range(3):
-        x, y, z = _relative(vertices, faces[face, k], eye)
-        q0, s0 = _row(m, 0, x, y, z)
-        q1, s1 = _row(m, 1, x, y, z)
-        q2, s2 = _row(m, 2, x, y, z)
-        e0, e1, e2 = SLACK * s0, SLACK * s1, SLACK * s2
-        if q2 + e2 >= near * (1.0 - NEAR_SLACK):
-            perhaps_front += 1
-        if q2 - e2 >= near * (1.0 - NEAR_SLACK):
-            surely_front += 1
-            px, py = q0 / q2, q1 / q2
-            ex, ey = (e0 + abs(px) * e2) / q2, (e1 + abs(py) * e2) / q2
-            low_x, high_x = min(low_x, px - ex), max(high_x, px + ex)
-            low_y, high_y = min(low_y, py - ey), max(high_y, py + ey)
-        # Wholly beside the grown screen, in homogeneous form.
-        left &= q0 + e0 + margin * (q2 + e2) < 0.0
-        right &= q0 - e0 - (width + margin) * (q2 + e2) > 0.0
-        above &= q1 + e1 + margin * (q2 + e2) < 0.0
-        below &= q1 - e1 - (height + margin) * (q2 + e2) > 0.0
-    if perhaps_front == 0 or left or right or above or below:
-        return False, 0, 0, 0, 0
-    if surely_front != 3:
-        return True, 0, 0, width - 1, height - 1
-    low_x -= margin
-    low_y -= margin
-    high_x += margin
-    high_y += margin
-    # Not by conversion alone: a far corner may not fit an integer.
-    if high_x < 0.0 or high_y < 0.0 or low_x > width or low_y > height:
-        return False, 0, 0, 0, 0
-    i0 = int(max(low_x, 0.0))
-    j0 = int(max(low_y, 0.0))
-    i1 = int(min(high_x, width - 1.0))
-    j1 = int(min(high_y, height - 1.0))
-    return i0 <= i1 and j0 <= j1, i0, j0, i1, j1
-
-
-@parallel_kernel
-def bin_faces(
-    vertices, faces, first, last, eye, m, near, width, height, margin, tiles_x, chunk, cursors, bins
-):  # fmt: skip
-    """Count, or with room in `bins` note, each face first..last-1 in every tile of its box.
-
-    cursors (chunks, tiles) int32 are advanced: from zero they become counts, from the places that
-    `hybrid_rt.kernels.raster.prefix_sums` makes of those they fill bins (entries,) int32.
-    """
-    note = len(bins) > 0
-    for c in prange(len(cursors)):
-        begin = first + c * chunk
-        for face in range(begin, min(begin + chunk, last)):
-            some, i0, j0, i1, j1 = face_box(
-                vertices, faces, face, eye, m, near, width, height, margin
-            )
-            if not some:
-                continue
-            for v in range(j0 >> TILE_BITS, (j1 >> TILE_BITS) + 1):
-                for u in range(i0 >> TILE_BITS, (i1 >> TILE_BITS) + 1):
-                    tile = v * tiles_x + u
-                    if note:
-                        bins[cursors[c, tile]] = face
-                    cursors[c, tile] += 1
-
-
-@kernel
-def set_up(vertices, faces, face, eye, m, frame, near, width, height, out):
-    """Fill `out` (SETUP,) float64 with a face's edges and plane; return COVER or ALL.
-
-    ALL: the face is seen edge-on, so only its box and its nearest depth bound it.
-    """
-    ax, ay, az = _relative(vertices, faces[face, 0], eye)
-    bx, by, bz = _relative(vertices, faces[face, 1], eye)
-    cx, cy, cz = _relative(vertices, faces[face, 2], eye)
-    # The nearest depth of what lies in front of the near plane.
-    a2, sa2 = _row(m, 2, ax, ay, az)
-    b2, sb2 = _row(m, 2, bx, by, bz)
-    c2, sc2 = _row(m, 2, cx, cy, cz)
-    closest = min(a2 - SLACK * sa2, b2 - SLACK * sb2, c2 - SLACK * sc2)
-    out[NEAREST] = near / max(closest, near * (1.0 - NEAR_SLACK))
-
-    ux, uy, uz = _edge(vertices, faces[face, 0], faces[face, 1])
-    vx, vy, vz = _edge(vertices, faces[face, 0], faces[face, 2])
-    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    n_slack = SLACK * (abs(ux) + abs(uy) + abs(uz)) * (abs(vx) + abs(vy) + abs(vz))
-    d = nx * ax + ny * ay + nz * az
-    d_slack = n_slack * (abs(ax) + abs(ay) + abs(az))
-    if not abs(d) > EDGE_ON * d_slack:
-        return ALL
-    side = 1.0 if d > 0.0 else -1.0
-    out[DENOMINATOR] = side * d - d_slack
-    out[LOWERED] = 2.0 * d_slack / out[DENOMINATOR]
-    reach = 0.0
-    for k in range(3):
-        value = side * near * (nx * frame[k, 0] + ny * frame[k, 1] + nz * frame[k, 2])
-        out[PLANE + k] = value
-        size = abs(frame[k, 0]) + abs(frame[k, 1]) + abs(frame[k, 2])
-        extent = width if k == 0 else (height if k == 1 else 1.0)
-        reach += near * extent * n_slack * size
-    out[PLANE + 3] = reach
-
-    a0, sa0 = _row(m, 0, ax, ay, az)
-    a1, sa1 = _row(m, 1, ax, ay, az)
-    b0, sb0 = _row(m, 0, bx, by, bz)
-    b1, sb1 = _row(m, 1, bx, by, bz)
-    c0, sc0 = _row(m, 0, cx, cy, cz)
-    c1, sc1 = _row(m, 1, cx, cy, cz)
-    edge_plane(a0, a1, a2, sa0, sa1, sa2, b0, b1, b2, sb0, sb1, sb2, side, width, height, out, 0)
-    edge_plane(b0, b1, b2, sb0, sb1, sb2, c0, c1, c2, sc0, sc1, sc2, side, width, height, out, 4)
-    edge_plane(c0, c1, c2, sc0, sc1, sc2, a0, a1, a2, sa0, sa1, sa2, side, width, height, out, 8)
-    return COVER
-
-
-@inlined
-def edge_plane(p0, p1, p2, s0, s1, s2, q0, q1, q2, r0, r1, r2, side, width, height, out, at):
-    """Write the plane through the eye and an edge, turned inwards, and its slack on the screen."""
-    out[at] = side * (p1 * q2 - p2 * q1)
-    out[at + 1] = side * (p2 * q0 - p0 * q2)
-    out[at + 2] = side * (p0 * q1 - p1 * q0)
-    out[at + 3] = SLACK * (
-        (s1 * r2 + s2 * r1) * (width + 1) + (s2 * r0 + s0 * r2) * (height + 1) + s0 * r1 + s1 * r0
-    )
-
-
-# A row of what `face_planes` writes: slopes, depth at a reference point, that point, error; padded
-# so that no row lies across two cache lines.
+# What is kept of a face's depth plane for the march, in float32: slopes, depth at a reference
+# point, that point, error; padded so that no row lies across two cache lines. In the grown pixels
+# of the face's box, and for a place (x, y) that is off by no more than half of the margin, ``DEPTH +
+# SLOPE_X (x - REFERENCE_X) + SLOPE_Y (y - REFERENCE_Y)`` in float32 errs by less than ERROR. Faces
+# seen edge-on, or beside the screen, have NaN.
 SLOPE_X, SLOPE_Y, DEPTH, REFERENCE_X, REFERENCE_Y, ERROR, PLANE_ROW = 0, 1, 2, 3, 4, 5, 8
 
+BLOCK_X, BLOCK_Y = 4, 2
+"""Pixels of a block, a lane each: the first four are the upper row."""
+COLUMNS = TILE // BLOCK_X
+BLOCKS = COLUMNS * (TILE // BLOCK_Y)
 
-@parallel_kernel
-def face_planes(vertices, faces, eye, m, frame, near, width, height, margin, chunk, planes):
-    """Write float32 depth planes (F, PLANE_ROW) of all faces that may touch a pixel.
+BUCKETS = 256
+"""Depths that a tile's faces are sorted by, eight to each halving."""
+FULL = np.int32(2**31 - 1)
+SENTINEL = np.int64(2**63 - 1)
+INVERSE = np.array([0] + [65536 // n + 1 for n in range(1, LANES + 1)], np.int32)
+""" t * INVERSE[n] >> 16 is t // n for t < LANES."""
 
-    In the grown pixels of the face's box, and for a place (x, y) that is off by no more than half
-    of the margin, ``DEPTH + SLOPE_X (x - REFERENCE_X) + SLOPE_Y (y - REFERENCE_Y)`` in float32 errs
-    by less than ERROR. Faces seen edge-on, or beside the screen, have NaN.
+
+@inlined
+def corner(corners, k, eye):
+    """Return the world coordinates of corner k of the faces, and those relative to the eye."""
+    x = simd.to_f64(simd.load(corners, (3 * k) * LANES, LANES))
+    y = simd.to_f64(simd.load(corners, (3 * k + 1) * LANES, LANES))
+    z = simd.to_f64(simd.load(corners, (3 * k + 2) * LANES, LANES))
+    return x, y, z, x - eye[0], y - eye[1], z - eye[2]
+
+
+@inlined
+def size(x, y, z):
+    """Return the sum of the sizes of three coordinates."""
+    return simd.absolute(x) + simd.absolute(y) + simd.absolute(z)
+
+
+@inlined
+def highest(a, b, c, x0, y0, x1, y1):
+    """Return the largest of a x + b y + c over x0..x1, y0..y1."""
+    return simd.maximum(a * x0, a * x1) + (simd.maximum(b * y0, b * y1) + c)
+
+
+@inlined
+def edge_plane(p0, p1, p2, s0, s1, s2, q0, q1, q2, r0, r1, r2, side, width, height, half):
+    """Return the plane through the eye and an edge, turned inwards.
+
+    To the constant is added what it gains over a square of half side `half`, and its slack.
     """
-    for c in prange(-(-len(faces) // chunk)):
-        setup = np.empty(SETUP, np.float64)
-        for face in range(c * chunk, min((c + 1) * chunk, len(faces))):
-            row = planes[face]
-            row[DEPTH] = np.nan
-            some, i0, j0, i1, j1 = face_box(
-                vertices, faces, face, eye, m, near, width, height, margin
-            )
-            if not some:
-                continue
-            kind = set_up(vertices, faces, face, eye, m, frame, near, width, height, setup)
-            if kind != COVER:
-                continue
-            x, y = 0.5 * (i0 + i1 + 1), 0.5 * (j0 + j1 + 1)
-            reach_x, reach_y = 0.5 * (i1 - i0 + 3), 0.5 * (j1 - j0 + 3)
-            # set_up has lowered the denominator by its error, no more than a thousandth of it.
-            d = setup[DENOMINATOR]
-            a, b = setup[PLANE] / d, setup[PLANE + 1] / d
-            at = a * (x - 0.5 * width) + b * (y - 0.5 * height) + setup[PLANE + 2] / d
-            size = abs(at) + abs(a) * reach_x + abs(b) * reach_y
-            error = PLANE_ULPS * size + (abs(a) + abs(b)) * margin + setup[PLANE + 3] / d
-            error += size * setup[LOWERED]
-            row[SLOPE_X], row[SLOPE_Y], row[DEPTH] = a, b, at
-            row[REFERENCE_X], row[REFERENCE_Y] = x, y
-            row[ERROR] = error * (1.0 + 2.0**-20)
+    a = side * (p1 * q2 - p2 * q1)
+    b = side * (p2 * q0 - p0 * q2)
+    c = side * (p0 * q1 - p1 * q0)
+    slack = SLACK * (
+        (s1 * r2 + s2 * r1) * (width + 1.0) + (s2 * r0 + s0 * r2) * (height + 1.0)
+        + (s0 * r1 + s1 * r0)
+    )  # fmt: skip
+    return a, b, c + (simd.absolute(a) + simd.absolute(b)) * half + slack
 
 
 @inlined
-def inside_edge(out, at, x, y, half):
-    """May a square of half side `half` around (x, y) hold a point inside of an edge."""
-    a, b = out[at], out[at + 1]
-    return a * x + b * y + out[at + 2] + (abs(a) + abs(b)) * half + out[at + 3] >= 0.0
+def store_planes(a, b, c, reach, lowered, sloped, boxes, cx, cy, margin, planes):
+    """Store the rows SLOPE_X to ERROR, LANES float32 each, for the planes of LANES faces.
+
+    a, b, c: the plane about the screen's centre; reach: its error; lowered: twice the relative
+    error of its denominator; boxes (4 * LANES,) int32 of the faces.
+    """
+    i0, j0, i1, j1 = box_of(boxes)
+    x, y = 0.5 * (i0 + i1 + 1.0), 0.5 * (j0 + j1 + 1.0)
+    at = a * (x - cx) + b * (y - cy) + c
+    steep_x, steep_y = simd.absolute(a), simd.absolute(b)
+    most = simd.absolute(at) + steep_x * (0.5 * (i1 - i0 + 3.0)) + steep_y * (0.5 * (j1 - j0 + 3.0))
+    error = PLANE_ULPS * most + (steep_x + steep_y) * margin + reach + most * lowered
+    simd.store(planes, SLOPE_X * LANES, simd.to_f32(a))
+    simd.store(planes, SLOPE_Y * LANES, simd.to_f32(b))
+    simd.store(planes, DEPTH * LANES, simd.to_f32(simd.select(sloped, at, np.nan)))
+    simd.store(planes, REFERENCE_X * LANES, simd.to_f32(x))
+    simd.store(planes, REFERENCE_Y * LANES, simd.to_f32(y))
+    simd.store(planes, ERROR * LANES, simd.to_f32(error * (1.0 + 2.0**-20)))
 
 
 @inlined
-def round_up(depth):
-    """Return a float32 that is no less than a depth."""
-    return max(np.float32(depth * (1.0 + 2.0**-22)), TINY)
+def box_of(boxes):
+    """Return first column, first row, last column, last row of LANES boxes as float64."""
+    return (
+        simd.to_f64(simd.load(boxes, 0, LANES)),
+        simd.to_f64(simd.load(boxes, LANES, LANES)),
+        simd.to_f64(simd.load(boxes, 2 * LANES, LANES)),
+        simd.to_f64(simd.load(boxes, 3 * LANES, LANES)),
+    )
 
 
 @inlined
-def insert(face, bound, ids, bounds, rest, at):
-    """Put a face into the list of pixel `at`, nearest first; what falls out raises `rest`."""
-    k = ids.shape[1]
-    if bound <= bounds[at, k - 1]:
-        rest[at] = max(rest[at], bound)
-        return
-    rest[at] = max(rest[at], bounds[at, k - 1])
-    j = k - 1
-    while j > 0 and bounds[at, j - 1] < bound:
-        bounds[at, j] = bounds[at, j - 1]
-        ids[at, j] = ids[at, j - 1]
-        j -= 1
-    bounds[at, j] = bound
-    ids[at, j] = face
+def set_up(
+    corners, boxes, drawn, eye, m, frame, near, width, height, margin, cx, cy, rows, planes
+):  # fmt: skip
+    """Fill `rows` with the edges and planes of LANES faces; return which may touch a square, bits.
+
+    corners (9 * LANES,) float32: x, y, z of the first corners, of the second, of the third; boxes,
+    drawn (4 * LANES,) int32: the boxes of the faces, and what is drawn of them. planes: see
+    `store_planes`.
+    """
+    half = 0.5 + margin
+    xa, ya, za, ax, ay, az = corner(corners, 0, eye)
+    xb, yb, zb, bx, by, bz = corner(corners, 1, eye)
+    xc, yc, zc, cx_, cy_, cz = corner(corners, 2, eye)
+    # A face with two equal corners is a line or a point and is never hit.
+    area = ~(
+        ((xa == xb) & (ya == yb) & (za == zb))
+        | ((xb == xc) & (yb == yc) & (zb == zc))
+        | ((xc == xa) & (yc == ya) & (zc == za))
+    )
+    a0, sa0 = row(m, 0, ax, ay, az)
+    a1, sa1 = row(m, 1, ax, ay, az)
+    a2, sa2 = row(m, 2, ax, ay, az)
+    b0, sb0 = row(m, 0, bx, by, bz)
+    b1, sb1 = row(m, 1, bx, by, bz)
+    b2, sb2 = row(m, 2, bx, by, bz)
+    c0, sc0 = row(m, 0, cx_, cy_, cz)
+    c1, sc1 = row(m, 1, cx_, cy_, cz)
+    c2, sc2 = row(m, 2, cx_, cy_, cz)
+    # Float32 inputs, so that one rounding is all the error of the edges.
+    ux, uy, uz = xb - xa, yb - ya, zb - za
+    vx, vy, vz = xc - xa, yc - ya, zc - za
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    n_slack = SLACK * size(ux, uy, uz) * size(vx, vy, vz)
+    d = nx * ax + ny * ay + nz * az
+    d_slack = n_slack * size(ax, ay, az)
+    sloped = simd.absolute(d) > EDGE_ON * d_slack
+    side = simd.select(d > 0.0, simd.f64(1.0, LANES), -1.0)
+    scale = 1.0 / simd.select(sloped, side * d - d_slack, 1.0)
+    towards = side * near
+    pa = towards * (nx * frame[0, 0] + ny * frame[0, 1] + nz * frame[0, 2])
+    pb = towards * (nx * frame[1, 0] + ny * frame[1, 1] + nz * frame[1, 2])
+    pc = towards * (nx * frame[2, 0] + ny * frame[2, 1] + nz * frame[2, 2])
+    reach = n_slack * (near * (
+        width * (abs(frame[0, 0]) + abs(frame[0, 1]) + abs(frame[0, 2]))
+        + height * (abs(frame[1, 0]) + abs(frame[1, 1]) + abs(frame[1, 2]))
+        + (abs(frame[2, 0]) + abs(frame[2, 1]) + abs(frame[2, 2]))
+    ))  # fmt: skip
+    spread = (simd.absolute(pa) + simd.absolute(pb)) * half + reach
+    pa, pb = pa * scale, pb * scale
+    store_planes(
+        pa, pb, pc * scale, reach * scale, 2.0 * d_slack * scale, sloped, boxes, cx, cy, margin,
+        planes,
+    )  # fmt: skip
+    # A face that is seen edge-on is bounded by its box and its nearest depth alone.
+    pa = simd.select(sloped, pa, 0.0)
+    pb = simd.select(sloped, pb, 0.0)
+    pc = simd.select(sloped, (pc + spread) * scale, np.inf)
+    limit = simd.select(sloped, CAP + 2.0 * (spread * scale), np.inf)
+
+    side = simd.select(sloped, side, 0.0)
+    ea, eb, ec = edge_plane(
+        a0, a1, a2, sa0, sa1, sa2, b0, b1, b2, sb0, sb1, sb2, side, width, height, half
+    )
+    fa, fb, fc = edge_plane(
+        b0, b1, b2, sb0, sb1, sb2, c0, c1, c2, sc0, sc1, sc2, side, width, height, half
+    )
+    ga, gb, gc = edge_plane(
+        c0, c1, c2, sc0, sc1, sc2, a0, a1, a2, sa0, sa1, sa2, side, width, height, half
+    )
+    i0, j0, i1, j1 = box_of(drawn)
+    x0, y0, x1, y1 = i0 + 0.5, j0 + 0.5, i1 + 0.5, j1 + 0.5
+    bound = highest(pa, pb, pc, x0 - cx, y0 - cy, x1 - cx, y1 - cy)
+    some = area & (highest(ea, eb, ec, x0, y0, x1, y1) >= 0.0)
+    some = some & (highest(fa, fb, fc, x0, y0, x1, y1) >= 0.0)
+    some = some & (highest(ga, gb, gc, x0, y0, x1, y1) >= 0.0)
+    some = some & (bound > 0.0)
+
+    simd.store(rows, 0 * LANES, ea)
+    simd.store(rows, 1 * LANES, eb)
+    simd.store(rows, 2 * LANES, ec)
+    simd.store(rows, 3 * LANES, fa)
+    simd.store(rows, 4 * LANES, fb)
+    simd.store(rows, 5 * LANES, fc)
+    simd.store(rows, 6 * LANES, ga)
+    simd.store(rows, 7 * LANES, gb)
+    simd.store(rows, 8 * LANES, gc)
+    simd.store(rows, PLANE * LANES, pa)
+    simd.store(rows, (PLANE + 1) * LANES, pb)
+    simd.store(rows, (PLANE + 2) * LANES, pc)
+    simd.store(rows, LIMIT * LANES, limit)
+    return simd.bits(some)
 
 
 @inlined
-def draw(face, kind, setup, left, top, i0, j0, i1, j1, half, cx, cy, ids, bounds, rest):
+def insert(new, block, length, keys, filled, farthest):
+    """Put keys, 0 for none, into the lists of a block's pixels; what falls out raises the rest.
+
+    Sorted lists take a key by ``list[k] = max(list[k], min(list[k - 1], key))`` in every place. The
+    places are walked from the last to where no key is larger than what stands before it; before the
+    first stands SENTINEL. There is one way out of here: with more Numba counts references.
+    """
+    base = (block * (length + 2) + 1) * LANES
+    n = filled[block]
+    k = min(n, length)
+    old = simd.i64(0, LANES)
+    if n > length:
+        old = simd.load(keys, base + k * LANES, LANES)
+    if simd.any_(new > old):
+        filled[block] = k + 1
+        before = simd.load(keys, base + (k - 1) * LANES, LANES)
+        last = simd.maximum(old, simd.minimum(before, new))
+        simd.store(keys, base + k * LANES, last)
+        if k == length:
+            farthest[block] = np.int32(simd.reduce_min(last) >> 32)
+        while simd.any_(new > before):
+            k -= 1
+            old = before
+            before = simd.load(keys, base + (k - 1) * LANES, LANES)
+            simd.store(keys, base + k * LANES, simd.maximum(old, simd.minimum(before, new)))
+
+
+@inlined
+def hidden(left, top, i0, j0, i1, j1, farthest):
+    """Return the bits of a bound that is below what all pixels of a box have left out."""
+    low = simd.i32(FULL, COLUMNS)
+    for v in range((j0 - top) >> 1, ((j1 - top) >> 1) + 1):
+        low = simd.minimum(low, simd.load(farthest, v * COLUMNS, COLUMNS))
+    column = simd.iota(COLUMNS)
+    there = (column >= ((i0 - left) >> 2)) & (column <= ((i1 - left) >> 2))
+    return simd.reduce_min(simd.select(there, low, FULL))
+
+
+@inlined
+def draw(
+    face, nearest, lane, rows, left, top, i0, j0, i1, j1, cx, cy, length, keys, filled, farthest
+):  # fmt: skip
     """Insert a face into the lists of those pixels i0..i1, j0..j1 of a tile that it may touch.
 
-    (cx, cy) is the screen's centre, about which the plane is given.
+    Blocks go in groups of up to LANES: the box in one, if it has no more, or a row of it.
     """
-    nearest = setup[NEAREST]
-    for j in range(j0, j1 + 1):
-        y = j + 0.5
-        for i in range(i0, i1 + 1):
-            x = i + 0.5
-            bound = nearest
-            if kind == COVER:
-                if not (
-                    inside_edge(setup, EDGES, x, y, half)
-                    and inside_edge(setup, EDGES + 4, x, y, half)
-                    and inside_edge(setup, EDGES + 8, x, y, half)
-                ):
-                    continue
-                a, b = setup[PLANE], setup[PLANE + 1]
-                middle = a * (x - cx) + b * (y - cy) + setup[PLANE + 2]
-                spread = (abs(a) + abs(b)) * half + setup[PLANE + 3]
-                high = (middle + spread) / setup[DENOMINATOR]
-                if high <= 0.0 or middle - spread > CAP * setup[DENOMINATOR]:
-                    continue  # beyond infinity, or nearer than the near plane, all over the square
-                bound = min(bound, high)
-            insert(face, round_up(bound), ids, bounds, rest, (j - top) * TILE + (i - left))
+    a0, b0, c0 = rows[lane], rows[LANES + lane], rows[2 * LANES + lane]
+    a1, b1, c1 = rows[3 * LANES + lane], rows[4 * LANES + lane], rows[5 * LANES + lane]
+    a2, b2, c2 = rows[6 * LANES + lane], rows[7 * LANES + lane], rows[8 * LANES + lane]
+    pa, pb, pc = (
+        rows[PLANE * LANES + lane], rows[(PLANE + 1) * LANES + lane],
+        rows[(PLANE + 2) * LANES + lane],
+    )  # fmt: skip
+    limit = rows[LIMIT * LANES + lane]
+    number = simd.iota(LANES)
+    x = simd.to_f64(number & 3) + 0.5
+    y = simd.to_f64(number >> 2) + 0.5
+    within0, within1, within2 = a0 * x + b0 * y, a1 * x + b1 * y, a2 * x + b2 * y
+    within_p = pa * x + pb * y
+    most0 = max(0.5 * a0, 3.5 * a0) + max(0.5 * b0, 1.5 * b0)
+    most1 = max(0.5 * a1, 3.5 * a1) + max(0.5 * b1, 1.5 * b1)
+    most2 = max(0.5 * a2, 3.5 * a2) + max(0.5 * b2, 1.5 * b2)
+    low_bits = np.int64(~face) & np.int64(0xFFFFFFFF)
+
+    u0, v0 = (i0 - left) >> 2, (j0 - top) >> 1
+    wide, high = ((i1 - left) >> 2) - u0 + 1, ((j1 - top) >> 1) - v0 + 1
+    together = wide * high <= LANES
+    count = wide * high if together else wide
+    inverse = np.int64(INVERSE[wide] if together else 0)
+    down = (number * np.int32(inverse)) >> 16
+    xs = simd.to_f64(((number - down * np.int32(wide)) << 2) + np.int32(left + 4 * u0))
+    columns = (np.int64(2) << (i1 - left)) - (np.int64(1) << (i0 - left))
+    for group in range(1 if together else high):
+        ys = simd.to_f64((down << 1) + np.int32(top + 2 * (v0 + group)))
+        blocks = simd.bits(
+            (a0 * xs + (b0 * ys + (c0 + most0)) >= 0.0)
+            & (a1 * xs + (b1 * ys + (c1 + most1)) >= 0.0)
+            & (a2 * xs + (b2 * ys + (c2 + most2)) >= 0.0)
+        )
+        blocks &= (np.int64(1) << count) - 1
+        while blocks != 0:
+            at = simd.lowest(blocks)
+            blocks &= blocks - 1
+            # Not from the vectors by way of memory: a load from amid a store just made waits for
+            # all stores before it.
+            v = (at * inverse) >> 16
+            u = at - v * wide + u0
+            v += v0 + group
+            i, j = left + 4 * u, top + 2 * v
+            lines = np.int64(0x0F if j >= j0 else 0) | np.int64(0xF0 if j < j1 else 0)
+            bound = within_p + (pa * (i - cx) + (pb * (j - cy) + pc))
+            inside = (
+                (within0 + (a0 * i + (b0 * j + c0)) >= 0.0)
+                & (within1 + (a1 * i + (b1 * j + c1)) >= 0.0)
+                & (within2 + (a2 * i + (b2 * j + c2)) >= 0.0)
+                # Neither beyond infinity nor nearer than the near plane, all over the square.
+                & (bound > 0.0)
+                & (bound <= limit)
+                & simd.mask_of_bits(lines & (((columns >> (4 * u)) & 15) * 17), LANES)
+            )
+            depth = simd.bits_i32(simd.minimum(round_up(bound), nearest))
+            new = simd.select(inside, (simd.to_i64(depth) << 32) | low_bits, 0)
+            insert(new, v * COLUMNS + u, length, keys, filled, farthest)
+
+
+@inlined
+def near_first(bins, start, end, nears, order, heads):
+    """Put bins start..end-1 into `order`, roughly nearest first.
+
+    nears: bits (int32) of bounds of the depth; heads (BUCKETS + 1,) int32 is scratch. The lists do
+    not depend on the order; what is near hides what comes later.
+    """
+    heads[:] = 0
+    for at in range(start, end):
+        heads[bucket(nears[bins[at]]) + 1] += 1
+    for b in range(BUCKETS):
+        heads[b + 1] += heads[b]
+    for at in range(start, end):
+        s = bins[at]
+        b = bucket(nears[s])
+        order[heads[b]] = s
+        heads[b] += 1
+
+
+@inlined
+def bucket(bits):
+    """Return a number that is smaller for nearer depths, given as bits of a float32."""
+    return min(max((0x3F8 - (bits >> 20)), 0), BUCKETS - 1)
+
+
+@inlined
+def read_tile(left, top, right, bottom, prim_id, nearest, rest, words, floats):
+    """Read a tile's lists, as earlier batches have left them."""
+    length = prim_id.shape[2]
+    for j in range(top, bottom):
+        for i in range(left, right):
+            at = ((j - top) >> 1) * COLUMNS + ((i - left) >> 2)
+            at = (at * (length + 2) + 1) * LANES + ((j - top) & 1) * BLOCK_X + ((i - left) & 3)
+            for k in range(length):
+                words[2 * (at + k * LANES)] = ~prim_id[j, i, k]
+                floats[2 * (at + k * LANES) + 1] = nearest[j, i, k]
+            floats[2 * (at + length * LANES) + 1] = rest[j, i]
+
+
+@inlined
+def write_tile(left, top, right, bottom, keys, words, floats, filled, prim_id, nearest, rest):
+    """Write a finished tile's lists to the arrays; words and floats are the halves of the keys."""
+    length = prim_id.shape[2]
+    for block in range(BLOCKS):
+        for k in range(filled[block], length + 1):
+            simd.store(keys, (block * (length + 2) + 1 + k) * LANES, simd.i64(0, LANES))
+    for j in range(top, bottom):
+        for i in range(left, right):
+            at = ((j - top) >> 1) * COLUMNS + ((i - left) >> 2)
+            at = (at * (length + 2) + 1) * LANES + ((j - top) & 1) * BLOCK_X + ((i - left) & 3)
+            for k in range(length):
+                prim_id[j, i, k] = ~words[2 * (at + k * LANES)]
+                nearest[j, i, k] = floats[2 * (at + k * LANES) + 1]
+            rest[j, i] = floats[2 * (at + length * LANES) + 1]
+
+
+@inlined
+def aligned(n):
+    """Return n int64 that start at a multiple of 64 bytes, so that vectors stay in cache lines."""
+    raw = np.empty(n + 8, np.int64)
+    start = (-raw.ctypes.data % 64) // 8
+    return raw[start : start + n]
 
 
 @parallel_kernel
 def fill_lists(
-    vertices, faces, tile_start, bins, eye, m, frame, near, width, height, margin, tiles_x, lanes,
-    prim_id, nearest, rest,
+    vertices, faces, tile_start, bins, survivors, spans, nears, eye, m, frame, near, width, height,
+    margin, tiles_x, workers, fresh, prim_id, nearest, rest, planes,
 ):  # fmt: skip
     """Insert every bin's faces into the lists of its tile.
 
     prim_id (H, W, K) int32, nearest (H, W, K) and rest (H, W) float32 hold what earlier batches
-    have left: -1, 0 and 0 at first.
+    have left; with `fresh` they hold nothing yet and all is written. planes (F, PLANE_ROW) float32:
+    each tile writes the rows of the faces that it draws, all tiles the same.
     """
     length = prim_id.shape[2]
     tiles = len(tile_start) - 1
-    half = 0.5 + margin
-    for lane in prange(lanes):
-        ids = np.empty((TILE * TILE, length), np.int32)
-        bounds = np.empty((TILE * TILE, length), np.float32)
-        others = np.empty(TILE * TILE, np.float32)
-        setup = np.empty(SETUP, np.float64)
-        for tile in range(lane, tiles, lanes):
-            if tile_start[tile] == tile_start[tile + 1]:
-                continue
-            left = (tile % tiles_x) << TILE_BITS
-            top = (tile // tiles_x) << TILE_BITS
-            right = min(left + TILE, width)
-            bottom = min(top + TILE, height)
-            for j in range(top, bottom):
-                for i in range(left, right):
-                    at = (j - top) * TILE + (i - left)
-                    others[at] = rest[j, i]
-                    for k in range(length):
-                        ids[at, k] = prim_id[j, i, k]
-                        bounds[at, k] = nearest[j, i, k]
-            for entry in range(tile_start[tile], tile_start[tile + 1]):
-                face = bins[entry]
-                _, i0, j0, i1, j1 = face_box(
-                    vertices, faces, face, eye, m, near, width, height, margin
+    cx, cy = 0.5 * width, 0.5 * height
+    most = 0
+    for tile in range(tiles):
+        most = max(most, tile_start[tile + 1] - tile_start[tile])
+    near_bits = nears.view(np.int32)
+    taken = np.zeros(1, np.int64)
+    for _ in prange(workers):
+        owner = aligned(BLOCKS * (length + 2) * LANES)
+        keys = borrowed(owner)
+        words, floats = keys.view(np.int32), keys.view(np.float32)
+        rows = aligned(ROWS * LANES).view(np.float64)
+        corners = aligned(9 * LANES // 2).view(np.float32)
+        boxes = aligned(4 * LANES // 2).view(np.int32)
+        drawn = aligned(4 * LANES // 2).view(np.int32)
+        kept = aligned(PLANE_ROW * LANES // 2).view(np.float32)
+        chosen = np.zeros(LANES, np.int64)
+        owner2 = aligned(BLOCKS // 2).view(np.int32)
+        farthest = borrowed(owner2)
+        owner3 = np.empty(BLOCKS, np.int64)
+        filled = borrowed(owner3)
+        order = np.empty(most, np.int32)
+        heads = np.empty(BUCKETS + 1, np.int32)
+        for block in range(BLOCKS):
+            simd.store(keys, block * (length + 2) * LANES, simd.i64(SENTINEL, LANES))
+        corners[:] = np.float32(0.0)
+        boxes[:] = 0
+        drawn[:] = 0
+        tile = fetch_add(taken.ctypes.data, 1)
+        while tile < tiles:
+            start, end = np.int64(tile_start[tile]), np.int64(tile_start[tile + 1])
+            if fresh or end > start:
+                left = (tile % tiles_x) << TILE_BITS
+                top = (tile // tiles_x) << TILE_BITS
+                right = min(left + TILE, width)
+                bottom = min(top + TILE, height)
+                farthest[:] = 0
+                if fresh:
+                    filled[:] = 0
+                else:
+                    filled[:] = length + 1
+                    read_tile(left, top, right, bottom, prim_id, nearest, rest, words, floats)
+                near_first(bins, start, end, near_bits, order, heads)
+                at = np.int64(0)
+                while at < end - start:
+                    count = 0
+                    while count < LANES and at < end - start:
+                        s = order[at]
+                        at += 1
+                        i0, j0 = max(np.int64(spans[s, 0]), left), max(np.int64(spans[s, 1]), top)
+                        i1 = min(np.int64(spans[s, 2]), right - 1)
+                        j1 = min(np.int64(spans[s, 3]), bottom - 1)
+                        if near_bits[s] < hidden(left, top, i0, j0, i1, j1, farthest):
+                            continue
+                        chosen[count] = s
+                        face = survivors[s]
+                        for k in range(3):
+                            v = faces[face, k]
+                            corners[(3 * k) * LANES + count] = vertices[v, 0]
+                            corners[(3 * k + 1) * LANES + count] = vertices[v, 1]
+                            corners[(3 * k + 2) * LANES + count] = vertices[v, 2]
+                        for k in range(4):
+                            boxes[k * LANES + count] = spans[s, k]
+                        drawn[count], drawn[LANES + count] = i0, j0
+                        drawn[2 * LANES + count], drawn[3 * LANES + count] = i1, j1
+                        count += 1
+                    some = set_up(
+                        corners, boxes, drawn, eye, m, frame, near, width, height, margin, cx, cy,
+                        rows, kept,
+                    )  # fmt: skip
+                    some &= (np.int64(1) << count) - 1
+                    while some != 0:
+                        lane = simd.lowest(some)
+                        some &= some - 1
+                        face = survivors[chosen[lane]]
+                        for k in range(ERROR + 1):
+                            planes[face, k] = kept[k * LANES + lane]
+                        draw(
+                            face, nears[chosen[lane]], lane, rows, left, top,
+                            np.int64(drawn[lane]), np.int64(drawn[LANES + lane]),
+                            np.int64(drawn[2 * LANES + lane]), np.int64(drawn[3 * LANES + lane]),
+                            cx, cy, length, keys, filled, farthest,
+                        )  # fmt: skip
+                write_tile(
+                    left, top, right, bottom, keys, words, floats, filled, prim_id, nearest, rest
                 )
-                kind = set_up(vertices, faces, face, eye, m, frame, near, width, height, setup)
-                draw(
-                    face, kind, setup, left, top,
-                    max(i0, left), max(j0, top), min(i1, right - 1), min(j1, bottom - 1),
-                    half, 0.5 * width, 0.5 * height, ids, bounds, others,
-                )  # fmt: skip
-            for j in range(top, bottom):
-                for i in range(left, right):
-                    at = (j - top) * TILE + (i - left)
-                    rest[j, i] = others[at]
-                    for k in range(length):
-                        prim_id[j, i, k] = ids[at, k]
-                        nearest[j, i, k] = bounds[at, k]
+            tile = fetch_add(taken.ctypes.data, 1)
+        keep(owner)
+        keep(owner2)
+        keep(owner3)

@@ -23,6 +23,18 @@ def bits(typingctx, m):
 
 
 @intrinsic
+def lowest(typingctx, n):
+    """Return the number of the lowest set bit of an integer, a lane of `bits`; 64 of zero."""
+    need_integer("lowest", "n", n)
+
+    def generate(context, builder, sig, args):
+        word = context.cast(builder, args[0], sig.args[0], types.int64)
+        return builder.cttz(word, ir.Constant(ir.IntType(1), 0))
+
+    return types.int64(n), generate
+
+
+@intrinsic
 def any_(typingctx, m):
     """Return whether any lane of a mask is set."""
     need("any_", "m", m, "mask")
