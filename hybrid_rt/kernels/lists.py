@@ -50,7 +50,7 @@ PLANE, LIMIT, ROWS = 9, 12, 13
 
 # What is kept of a face's depth plane for the march, in float32: slopes, depth at a reference
 # point, that point, error; padded so that no row lies across two cache lines. In the grown pixels
-# of the face's box, and for a place (x, y) that is off by no more than half of the margin, ``DEPTH +
+# of the face's box, and for a place (x, y) off by no more than half of the margin, ``DEPTH +
 # SLOPE_X (x - REFERENCE_X) + SLOPE_Y (y - REFERENCE_Y)`` in float32 errs by less than ERROR. Faces
 # seen edge-on, or beside the screen, have NaN.
 SLOPE_X, SLOPE_Y, DEPTH, REFERENCE_X, REFERENCE_Y, ERROR, PLANE_ROW = 0, 1, 2, 3, 4, 5, 8

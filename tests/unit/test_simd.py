@@ -784,3 +784,13 @@ def test_all_of_this_on_another_machine(name):
     )  # fmt: skip
     assert done.returncode == 0, done.stdout
     print(done.stdout)
+
+
+@njit
+def lowest_of(n):
+    return simd.lowest(n)
+
+
+@pytest.mark.parametrize("n", [1, 2, 12, 1 << 40, -1, -(2**63), 0])
+def test_lowest_is_the_number_of_the_lowest_set_bit(n):
+    assert lowest_of(n) == next((k for k in range(64) if n >> k & 1), 64)
