@@ -60,10 +60,13 @@ BLOCK_X, BLOCK_Y = 4, 2
 COLUMNS = TILE // BLOCK_X
 BLOCKS = COLUMNS * (TILE // BLOCK_Y)
 
+WHOLE = 8
+"""Length of lists that are written a row of a block at a time."""
+LINE = WHOLE * BLOCK_X
+
 BUCKETS = 256
 """Depths that a tile's faces are sorted by, eight to each halving."""
 FULL = np.int32(2**31 - 1)
-SENTINEL = np.int64(2**63 - 1)
 INVERSE = np.array([0] + [65536 // n + 1 for n in range(1, LANES + 1)], np.int32)
 """ t * INVERSE[n] >> 16 is t // n for t < LANES."""
 
@@ -235,28 +238,26 @@ def set_up(
 def insert(new, block, length, keys, filled, farthest):
     """Put keys, 0 for none, into the lists of a block's pixels; what falls out raises the rest.
 
-    Sorted lists take a key by ``list[k] = max(list[k], min(list[k - 1], key))`` in every place. The
-    places are walked from the last to where no key is larger than what stands before it; before the
-    first stands SENTINEL. There is one way out of here: with more Numba counts references.
+    The larger of the key and what stands in a place stays, the smaller goes on. How many places are
+    filled is known before the first is read; where to stop would not be, and wrong guesses of that
+    cost more than the places that could be left out.
     """
-    base = (block * (length + 2) + 1) * LANES
+    base = block * (length + 1) * LANES
     n = filled[block]
-    k = min(n, length)
-    old = simd.i64(0, LANES)
+    last = simd.i64(0, LANES)
     if n > length:
-        old = simd.load(keys, base + k * LANES, LANES)
-    if simd.any_(new > old):
-        filled[block] = k + 1
-        before = simd.load(keys, base + (k - 1) * LANES, LANES)
-        last = simd.maximum(old, simd.minimum(before, new))
-        simd.store(keys, base + k * LANES, last)
-        if k == length:
+        last = simd.load(keys, base + length * LANES, LANES)
+    if simd.any_(new > last):
+        for k in range(n):
+            old = simd.load(keys, base + k * LANES, LANES)
+            last = simd.maximum(old, new)
+            new = simd.minimum(old, new)
+            simd.store(keys, base + k * LANES, last)
+        if n <= length:
+            simd.store(keys, base + n * LANES, new)
+            filled[block] = n + 1
+        else:
             farthest[block] = np.int32(simd.reduce_min(last) >> 32)
-        while simd.any_(new > before):
-            k -= 1
-            old = before
-            before = simd.load(keys, base + (k - 1) * LANES, LANES)
-            simd.store(keys, base + k * LANES, simd.maximum(old, simd.minimum(before, new)))
 
 
 @inlined
@@ -272,7 +273,8 @@ def hidden(left, top, i0, j0, i1, j1, farthest):
 
 @inlined
 def draw(
-    face, nearest, lane, rows, left, top, i0, j0, i1, j1, cx, cy, length, keys, filled, farthest
+    face, nearest, lane, rows, left, top, i0, j0, i1, j1, cx, cy, length, keys, filled, farthest,
+    places, starts,
 ):  # fmt: skip
     """Insert a face into the lists of those pixels i0..i1, j0..j1 of a tile that it may touch.
 
@@ -300,41 +302,43 @@ def draw(
     wide, high = ((i1 - left) >> 2) - u0 + 1, ((j1 - top) >> 1) - v0 + 1
     together = wide * high <= LANES
     count = wide * high if together else wide
-    inverse = np.int64(INVERSE[wide] if together else 0)
-    down = (number * np.int32(inverse)) >> 16
-    xs = simd.to_f64(((number - down * np.int32(wide)) << 2) + np.int32(left + 4 * u0))
-    columns = (np.int64(2) << (i1 - left)) - (np.int64(1) << (i0 - left))
+    down = (number * (INVERSE[wide] if together else np.int32(0))) >> 16
+    u = number - down * np.int32(wide) + np.int32(u0)
+    xs = simd.to_f64((u << 2) + np.int32(left))
+    columns = np.int32((np.int64(2) << (i1 - left)) - (np.int64(1) << (i0 - left)))
+    columns_of = ((simd.i32(columns, LANES) >> (u << 2)) & 15) * np.int32(17)
     for group in range(1 if together else high):
-        ys = simd.to_f64((down << 1) + np.int32(top + 2 * (v0 + group)))
-        blocks = simd.bits(
-            (a0 * xs + (b0 * ys + (c0 + most0)) >= 0.0)
-            & (a1 * xs + (b1 * ys + (c1 + most1)) >= 0.0)
-            & (a2 * xs + (b2 * ys + (c2 + most2)) >= 0.0)
+        v = down + np.int32(v0 + group)
+        line = (v << 1) + np.int32(top)
+        ys = simd.to_f64(line)
+        e0, e1, e2 = a0 * xs + (b0 * ys + c0), a1 * xs + (b1 * ys + c1), a2 * xs + (b2 * ys + c2)
+        simd.store(starts, 0, e0)
+        simd.store(starts, LANES, e1)
+        simd.store(starts, 2 * LANES, e2)
+        simd.store(starts, 3 * LANES, pa * (xs - cx) + (pb * (ys - cy) + pc))
+        lines_of = (simd.to_i32(line >= np.int32(j0)) * np.int32(0x0F)) | (
+            simd.to_i32(line < np.int32(j1)) * np.int32(0xF0)
         )
+        simd.store(places, 0, columns_of & lines_of)
+        simd.store(places, LANES, v * np.int32(COLUMNS) + u)
+        blocks = simd.bits((e0 + most0 >= 0.0) & (e1 + most1 >= 0.0) & (e2 + most2 >= 0.0))
         blocks &= (np.int64(1) << count) - 1
         while blocks != 0:
             at = simd.lowest(blocks)
             blocks &= blocks - 1
-            # Not from the vectors by way of memory: a load from amid a store just made waits for
-            # all stores before it.
-            v = (at * inverse) >> 16
-            u = at - v * wide + u0
-            v += v0 + group
-            i, j = left + 4 * u, top + 2 * v
-            lines = np.int64(0x0F if j >= j0 else 0) | np.int64(0xF0 if j < j1 else 0)
-            bound = within_p + (pa * (i - cx) + (pb * (j - cy) + pc))
+            bound = within_p + starts[3 * LANES + at]
             inside = (
-                (within0 + (a0 * i + (b0 * j + c0)) >= 0.0)
-                & (within1 + (a1 * i + (b1 * j + c1)) >= 0.0)
-                & (within2 + (a2 * i + (b2 * j + c2)) >= 0.0)
+                (within0 + starts[at] >= 0.0)
+                & (within1 + starts[LANES + at] >= 0.0)
+                & (within2 + starts[2 * LANES + at] >= 0.0)
                 # Neither beyond infinity nor nearer than the near plane, all over the square.
                 & (bound > 0.0)
                 & (bound <= limit)
-                & simd.mask_of_bits(lines & (((columns >> (4 * u)) & 15) * 17), LANES)
+                & simd.mask_of_bits(places[at], LANES)
             )
             depth = simd.bits_i32(simd.minimum(round_up(bound), nearest))
             new = simd.select(inside, (simd.to_i64(depth) << 32) | low_bits, 0)
-            insert(new, v * COLUMNS + u, length, keys, filled, farthest)
+            insert(new, np.int64(places[LANES + at]), length, keys, filled, farthest)
 
 
 @inlined
@@ -369,7 +373,7 @@ def read_tile(left, top, right, bottom, prim_id, nearest, rest, words, floats):
     for j in range(top, bottom):
         for i in range(left, right):
             at = ((j - top) >> 1) * COLUMNS + ((i - left) >> 2)
-            at = (at * (length + 2) + 1) * LANES + ((j - top) & 1) * BLOCK_X + ((i - left) & 3)
+            at = at * (length + 1) * LANES + ((j - top) & 1) * BLOCK_X + ((i - left) & 3)
             for k in range(length):
                 words[2 * (at + k * LANES)] = ~prim_id[j, i, k]
                 floats[2 * (at + k * LANES) + 1] = nearest[j, i, k]
@@ -377,20 +381,62 @@ def read_tile(left, top, right, bottom, prim_id, nearest, rest, words, floats):
 
 
 @inlined
+def transposed(a, b, c, d, e, f, g, h):
+    """Return eight vectors of LANES lanes as one, lane 0 of all of them first."""
+    return simd.interleave(
+        simd.interleave(simd.interleave(a, e), simd.interleave(c, g)),
+        simd.interleave(simd.interleave(b, f), simd.interleave(d, h)),
+    )
+
+
+@inlined
+def write_block(i, j, start, keys, prim_id, nearest, rest):
+    """Write the lists of length WHOLE of a whole block; its keys begin at `start`."""
+    k0, k1 = simd.load(keys, start, LANES), simd.load(keys, start + LANES, LANES)
+    k2, k3 = simd.load(keys, start + 2 * LANES, LANES), simd.load(keys, start + 3 * LANES, LANES)
+    k4, k5 = simd.load(keys, start + 4 * LANES, LANES), simd.load(keys, start + 5 * LANES, LANES)
+    k6, k7 = simd.load(keys, start + 6 * LANES, LANES), simd.load(keys, start + 7 * LANES, LANES)
+    ids = ~transposed(
+        simd.to_i32(k0), simd.to_i32(k1), simd.to_i32(k2), simd.to_i32(k3),
+        simd.to_i32(k4), simd.to_i32(k5), simd.to_i32(k6), simd.to_i32(k7),
+    )  # fmt: skip
+    bounds = simd.float_of_bits(
+        transposed(
+            simd.to_i32(k0 >> 32), simd.to_i32(k1 >> 32), simd.to_i32(k2 >> 32),
+            simd.to_i32(k3 >> 32), simd.to_i32(k4 >> 32), simd.to_i32(k5 >> 32),
+            simd.to_i32(k6 >> 32), simd.to_i32(k7 >> 32),
+        )  # fmt: skip
+    )
+    other = simd.float_of_bits(simd.to_i32(simd.load(keys, start + WHOLE * LANES, LANES) >> 32))
+    width = rest.shape[1]
+    upper, lower = j * width + i, (j + 1) * width + i
+    simd.store(prim_id, WHOLE * upper, simd.part(ids, 0, LINE))
+    simd.store(prim_id, WHOLE * lower, simd.part(ids, 1, LINE))
+    simd.store(nearest, WHOLE * upper, simd.part(bounds, 0, LINE))
+    simd.store(nearest, WHOLE * lower, simd.part(bounds, 1, LINE))
+    simd.store(rest, upper, simd.part(other, 0, BLOCK_X))
+    simd.store(rest, lower, simd.part(other, 1, BLOCK_X))
+
+
+@inlined
 def write_tile(left, top, right, bottom, keys, words, floats, filled, prim_id, nearest, rest):
     """Write a finished tile's lists to the arrays; words and floats are the halves of the keys."""
     length = prim_id.shape[2]
     for block in range(BLOCKS):
+        i0, j0 = left + (block % COLUMNS) * BLOCK_X, top + (block // COLUMNS) * BLOCK_Y
+        start = block * (length + 1) * LANES
         for k in range(filled[block], length + 1):
-            simd.store(keys, (block * (length + 2) + 1 + k) * LANES, simd.i64(0, LANES))
-    for j in range(top, bottom):
-        for i in range(left, right):
-            at = ((j - top) >> 1) * COLUMNS + ((i - left) >> 2)
-            at = (at * (length + 2) + 1) * LANES + ((j - top) & 1) * BLOCK_X + ((i - left) & 3)
-            for k in range(length):
-                prim_id[j, i, k] = ~words[2 * (at + k * LANES)]
-                nearest[j, i, k] = floats[2 * (at + k * LANES) + 1]
-            rest[j, i] = floats[2 * (at + length * LANES) + 1]
+            simd.store(keys, start + k * LANES, simd.i64(0, LANES))
+        if length == WHOLE and i0 + BLOCK_X <= right and j0 + BLOCK_Y <= bottom:
+            write_block(i0, j0, start, keys, prim_id, nearest, rest)
+        else:
+            for j in range(j0, min(j0 + BLOCK_Y, bottom)):
+                for i in range(i0, min(i0 + BLOCK_X, right)):
+                    at = start + (j - j0) * BLOCK_X + (i - i0)
+                    for k in range(length):
+                        prim_id[j, i, k] = ~words[2 * (at + k * LANES)]
+                        nearest[j, i, k] = floats[2 * (at + k * LANES) + 1]
+                    rest[j, i] = floats[2 * (at + length * LANES) + 1]
 
 
 @inlined
@@ -421,7 +467,7 @@ def fill_lists(
     near_bits = nears.view(np.int32)
     taken = np.zeros(1, np.int64)
     for _ in prange(workers):
-        owner = aligned(BLOCKS * (length + 2) * LANES)
+        owner = aligned(BLOCKS * (length + 1) * LANES)
         keys = borrowed(owner)
         words, floats = keys.view(np.int32), keys.view(np.float32)
         rows = aligned(ROWS * LANES).view(np.float64)
@@ -429,6 +475,8 @@ def fill_lists(
         boxes = aligned(4 * LANES // 2).view(np.int32)
         drawn = aligned(4 * LANES // 2).view(np.int32)
         kept = aligned(PLANE_ROW * LANES // 2).view(np.float32)
+        starts = aligned(4 * LANES).view(np.float64)
+        places = aligned(LANES).view(np.int32)
         chosen = np.zeros(LANES, np.int64)
         owner2 = aligned(BLOCKS // 2).view(np.int32)
         farthest = borrowed(owner2)
@@ -436,8 +484,6 @@ def fill_lists(
         filled = borrowed(owner3)
         order = np.empty(most, np.int32)
         heads = np.empty(BUCKETS + 1, np.int32)
-        for block in range(BLOCKS):
-            simd.store(keys, block * (length + 2) * LANES, simd.i64(SENTINEL, LANES))
         corners[:] = np.float32(0.0)
         boxes[:] = 0
         drawn[:] = 0
@@ -494,7 +540,7 @@ def fill_lists(
                             face, nears[chosen[lane]], lane, rows, left, top,
                             np.int64(drawn[lane]), np.int64(drawn[LANES + lane]),
                             np.int64(drawn[2 * LANES + lane]), np.int64(drawn[3 * LANES + lane]),
-                            cx, cy, length, keys, filled, farthest,
+                            cx, cy, length, keys, filled, farthest, places, starts,
                         )  # fmt: skip
                 write_tile(
                     left, top, right, bottom, keys, words, floats, filled, prim_id, nearest, rest

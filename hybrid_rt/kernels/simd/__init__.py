@@ -60,6 +60,7 @@ from .lanewise import (
 from .make import f32, f64, first, i32, i64, iota, mask, mask_of_bits
 from .memory import gather, load, load_masked, scatter, store, store_masked
 from .packing import compress, expand
+from .together import interleave, part
 
 __all__ = [
     "AVX512",
@@ -84,6 +85,7 @@ __all__ = [
     "i32",
     "i64",
     "insert",
+    "interleave",
     "iota",
     "load",
     "load_masked",
@@ -92,6 +94,7 @@ __all__ = [
     "mask_of_bits",
     "maximum",
     "minimum",
+    "part",
     "reduce_add",
     "reduce_max",
     "reduce_min",
