@@ -58,14 +58,12 @@ def primitive_lists(
             last = min(first + size, len(faces))
             chunk = -(-(last - first) // CHUNKS)
             chunks = -(-(last - first) // chunk)
-            survivors = np.empty(last - first, np.int32)
-            spans = np.empty((last - first, 4), np.int16)
-            nears = np.empty(last - first, np.float32)
+            records = np.empty((last - first, 2), np.int64)
             n_survivors = np.empty(chunks, np.int32)
             counts = np.empty((chunks, tiles), np.int32)
             bin_kernels.cull_and_count(
                 faces, first, last, corners, flags, nearest_of, width, height, tiles_x, workers,
-                chunk, survivors, spans, nears, n_survivors, counts,
+                chunk, records, n_survivors, counts,
             )  # fmt: skip
             entries = int(counts.sum(dtype=np.int64))
             if entries > BATCH_ENTRIES and size > 1:
@@ -74,10 +72,11 @@ def primitive_lists(
             tile_start = np.empty(tiles + 1, np.int32)
             prefix_sums(n_survivors, counts, np.empty(chunks + 1, np.int32), tile_start)
             bins = np.empty(entries, np.int32)
-            bin_kernels.fill_bins(spans, n_survivors, tiles_x, workers, chunk, counts, bins)
+            bin_kernels.fill_bins(records, n_survivors, tiles_x, workers, chunk, counts, bins)
             kernels.fill_lists(
-                vertices, faces, tile_start, bins, survivors, spans, nears, eye, m, frame, near,
-                width, height, margin, tiles_x, workers, first == 0, prim_id, nearest, rest, planes,
+                scene.corners.reshape(-1), tile_start, bins, records, eye, m, frame, near, width,
+                height, margin, tiles_x, workers, first == 0, prim_id, nearest, rest,
+                planes.reshape(-1),
             )  # fmt: skip
             first = last
     return PrimitiveLists(prim_id, nearest, rest, planes, margin)

@@ -72,12 +72,56 @@ INVERSE = np.array([0] + [65536 // n + 1 for n in range(1, LANES + 1)], np.int32
 
 
 @inlined
-def corner(corners, k, eye):
-    """Return the world coordinates of corner k of the faces, and those relative to the eye."""
-    x = simd.to_f64(simd.load(corners, (3 * k) * LANES, LANES))
-    y = simd.to_f64(simd.load(corners, (3 * k + 1) * LANES, LANES))
-    z = simd.to_f64(simd.load(corners, (3 * k + 2) * LANES, LANES))
-    return x, y, z, x - eye[0], y - eye[1], z - eye[2]
+def transposed(a, b, c, d, e, f, g, h):
+    """Return eight vectors of LANES lanes as one, lane 0 of all of them first."""
+    return simd.interleave(
+        simd.interleave(simd.interleave(a, e), simd.interleave(c, g)),
+        simd.interleave(simd.interleave(b, f), simd.interleave(d, h)),
+    )
+
+
+@inlined
+def put_in(v, b, c, d, e, f, g, h):
+    """Return a vector of LANES lanes with seven scalars in all but its first."""
+    v = simd.insert(simd.insert(simd.insert(v, 1, b), 2, c), 3, d)
+    return simd.insert(simd.insert(simd.insert(simd.insert(v, 4, e), 5, f), 6, g), 7, h)
+
+
+@inlined
+def coordinates(corners, chosen):
+    """Return x, y, z of the first corners of LANES faces, of their second and of their third."""
+    f0, f1, f2, f3 = 9 * chosen[0], 9 * chosen[1], 9 * chosen[2], 9 * chosen[3]
+    f4, f5, f6, f7 = 9 * chosen[4], 9 * chosen[5], 9 * chosen[6], 9 * chosen[7]
+    c = transposed(
+        simd.load(corners, f0, LANES), simd.load(corners, f1, LANES),
+        simd.load(corners, f2, LANES), simd.load(corners, f3, LANES),
+        simd.load(corners, f4, LANES), simd.load(corners, f5, LANES),
+        simd.load(corners, f6, LANES), simd.load(corners, f7, LANES),
+    )  # fmt: skip
+    last = put_in(
+        simd.f32(corners[f0 + 8], LANES), corners[f1 + 8], corners[f2 + 8], corners[f3 + 8],
+        corners[f4 + 8], corners[f5 + 8], corners[f6 + 8], corners[f7 + 8],
+    )  # fmt: skip
+    return (
+        simd.to_f64(simd.part(c, 0, LANES)), simd.to_f64(simd.part(c, 1, LANES)),
+        simd.to_f64(simd.part(c, 2, LANES)), simd.to_f64(simd.part(c, 3, LANES)),
+        simd.to_f64(simd.part(c, 4, LANES)), simd.to_f64(simd.part(c, 5, LANES)),
+        simd.to_f64(simd.part(c, 6, LANES)), simd.to_f64(simd.part(c, 7, LANES)),
+        simd.to_f64(last),
+    )  # fmt: skip
+
+
+@inlined
+def boxes_of(spans):
+    """Return first column, first row, last column and last row of LANES boxes as float64."""
+    box = put_in(
+        simd.i64(spans[0], LANES), spans[1], spans[2], spans[3], spans[4], spans[5], spans[6],
+        spans[7],
+    )  # fmt: skip
+    return (
+        simd.to_f64(simd.to_i32(box & 0xFFFF)), simd.to_f64(simd.to_i32((box >> 16) & 0xFFFF)),
+        simd.to_f64(simd.to_i32((box >> 32) & 0xFFFF)), simd.to_f64(simd.to_i32(box >> 48)),
+    )  # fmt: skip
 
 
 @inlined
@@ -109,51 +153,48 @@ def edge_plane(p0, p1, p2, s0, s1, s2, q0, q1, q2, r0, r1, r2, side, width, heig
 
 
 @inlined
-def store_planes(a, b, c, reach, lowered, sloped, boxes, cx, cy, margin, planes):
-    """Store the rows SLOPE_X to ERROR, LANES float32 each, for the planes of LANES faces.
+def store_planes(a, b, c, reach, lowered, sloped, i0, j0, i1, j1, cx, cy, margin, chosen, planes):
+    """Store the rows of `planes` for LANES faces.
 
     a, b, c: the plane about the screen's centre; reach: its error; lowered: twice the relative
-    error of its denominator; boxes (4 * LANES,) int32 of the faces.
+    error of its denominator; i0, j0, i1, j1: the boxes of the faces.
     """
-    i0, j0, i1, j1 = box_of(boxes)
     x, y = 0.5 * (i0 + i1 + 1.0), 0.5 * (j0 + j1 + 1.0)
     at = a * (x - cx) + b * (y - cy) + c
     steep_x, steep_y = simd.absolute(a), simd.absolute(b)
     most = simd.absolute(at) + steep_x * (0.5 * (i1 - i0 + 3.0)) + steep_y * (0.5 * (j1 - j0 + 3.0))
     error = PLANE_ULPS * most + (steep_x + steep_y) * margin + reach + most * lowered
-    simd.store(planes, SLOPE_X * LANES, simd.to_f32(a))
-    simd.store(planes, SLOPE_Y * LANES, simd.to_f32(b))
-    simd.store(planes, DEPTH * LANES, simd.to_f32(simd.select(sloped, at, np.nan)))
-    simd.store(planes, REFERENCE_X * LANES, simd.to_f32(x))
-    simd.store(planes, REFERENCE_Y * LANES, simd.to_f32(y))
-    simd.store(planes, ERROR * LANES, simd.to_f32(error * (1.0 + 2.0**-20)))
-
-
-@inlined
-def box_of(boxes):
-    """Return first column, first row, last column, last row of LANES boxes as float64."""
-    return (
-        simd.to_f64(simd.load(boxes, 0, LANES)),
-        simd.to_f64(simd.load(boxes, LANES, LANES)),
-        simd.to_f64(simd.load(boxes, 2 * LANES, LANES)),
-        simd.to_f64(simd.load(boxes, 3 * LANES, LANES)),
-    )
+    nothing = simd.f32(0.0, LANES)
+    rows = transposed(
+        simd.to_f32(a), simd.to_f32(b), simd.to_f32(simd.select(sloped, at, np.nan)),
+        simd.to_f32(x), simd.to_f32(y), simd.to_f32(error * (1.0 + 2.0**-20)), nothing, nothing,
+    )  # fmt: skip
+    simd.store(planes, PLANE_ROW * chosen[0], simd.part(rows, 0, LANES))
+    simd.store(planes, PLANE_ROW * chosen[1], simd.part(rows, 1, LANES))
+    simd.store(planes, PLANE_ROW * chosen[2], simd.part(rows, 2, LANES))
+    simd.store(planes, PLANE_ROW * chosen[3], simd.part(rows, 3, LANES))
+    simd.store(planes, PLANE_ROW * chosen[4], simd.part(rows, 4, LANES))
+    simd.store(planes, PLANE_ROW * chosen[5], simd.part(rows, 5, LANES))
+    simd.store(planes, PLANE_ROW * chosen[6], simd.part(rows, 6, LANES))
+    simd.store(planes, PLANE_ROW * chosen[7], simd.part(rows, 7, LANES))
 
 
 @inlined
 def set_up(
-    corners, boxes, drawn, eye, m, frame, near, width, height, margin, cx, cy, rows, planes
+    corners, chosen, spans, left, top, right, bottom, eye, m, frame, near, width, height, margin,
+    cx, cy, rows, planes,
 ):  # fmt: skip
     """Fill `rows` with the edges and planes of LANES faces; return which may touch a square, bits.
 
-    corners (9 * LANES,) float32: x, y, z of the first corners, of the second, of the third; boxes,
-    drawn (4 * LANES,) int32: the boxes of the faces, and what is drawn of them. planes: see
-    `store_planes`.
+    corners (9 F,) float32, world; chosen, spans (LANES,) int64: the faces and their boxes; left,
+    top, right, bottom: the part of the screen that is drawn. Their rows of `planes` are written.
     """
     half = 0.5 + margin
-    xa, ya, za, ax, ay, az = corner(corners, 0, eye)
-    xb, yb, zb, bx, by, bz = corner(corners, 1, eye)
-    xc, yc, zc, cx_, cy_, cz = corner(corners, 2, eye)
+    xa, ya, za, xb, yb, zb, xc, yc, zc = coordinates(corners, chosen)
+    ax, ay, az = xa - eye[0], ya - eye[1], za - eye[2]
+    bx, by, bz = xb - eye[0], yb - eye[1], zb - eye[2]
+    cx_, cy_, cz = xc - eye[0], yc - eye[1], zc - eye[2]
+    i0, j0, i1, j1 = boxes_of(spans)
     # A face with two equal corners is a line or a point and is never hit.
     area = ~(
         ((xa == xb) & (ya == yb) & (za == zb))
@@ -191,8 +232,8 @@ def set_up(
     spread = (simd.absolute(pa) + simd.absolute(pb)) * half + reach
     pa, pb = pa * scale, pb * scale
     store_planes(
-        pa, pb, pc * scale, reach * scale, 2.0 * d_slack * scale, sloped, boxes, cx, cy, margin,
-        planes,
+        pa, pb, pc * scale, reach * scale, 2.0 * d_slack * scale, sloped, i0, j0, i1, j1, cx, cy,
+        margin, chosen, planes,
     )  # fmt: skip
     # A face that is seen edge-on is bounded by its box and its nearest depth alone.
     pa = simd.select(sloped, pa, 0.0)
@@ -210,8 +251,8 @@ def set_up(
     ga, gb, gc = edge_plane(
         c0, c1, c2, sc0, sc1, sc2, a0, a1, a2, sa0, sa1, sa2, side, width, height, half
     )
-    i0, j0, i1, j1 = box_of(drawn)
-    x0, y0, x1, y1 = i0 + 0.5, j0 + 0.5, i1 + 0.5, j1 + 0.5
+    x0, y0 = simd.maximum(i0, left) + 0.5, simd.maximum(j0, top) + 0.5
+    x1, y1 = simd.minimum(i1, right - 1) + 0.5, simd.minimum(j1, bottom - 1) + 0.5
     bound = highest(pa, pb, pc, x0 - cx, y0 - cy, x1 - cx, y1 - cy)
     some = area & (highest(ea, eb, ec, x0, y0, x1, y1) >= 0.0)
     some = some & (highest(fa, fb, fc, x0, y0, x1, y1) >= 0.0)
@@ -258,6 +299,13 @@ def insert(new, block, length, keys, filled, farthest):
             filled[block] = n + 1
         else:
             farthest[block] = np.int32(simd.reduce_min(last) >> 32)
+
+
+@inlined
+def within(span, left, top, right, bottom):
+    """Return the part of a box that lies in a tile."""
+    i0, j0 = max(span & 0xFFFF, left), max((span >> 16) & 0xFFFF, top)
+    return i0, j0, min((span >> 32) & 0xFFFF, right - 1), min(span >> 48, bottom - 1)
 
 
 @inlined
@@ -342,20 +390,20 @@ def draw(
 
 
 @inlined
-def near_first(bins, start, end, nears, order, heads):
+def near_first(bins, start, end, records, order, heads):
     """Put bins start..end-1 into `order`, roughly nearest first.
 
-    nears: bits (int32) of bounds of the depth; heads (BUCKETS + 1,) int32 is scratch. The lists do
-    not depend on the order; what is near hides what comes later.
+    records: see `hybrid_rt.kernels.lists_bins.cull_and_count`; heads (BUCKETS + 1,) int32 is
+    scratch. The lists do not depend on the order; what is near hides what comes later.
     """
     heads[:] = 0
     for at in range(start, end):
-        heads[bucket(nears[bins[at]]) + 1] += 1
+        heads[bucket(records[bins[at], 1] >> 32) + 1] += 1
     for b in range(BUCKETS):
         heads[b + 1] += heads[b]
     for at in range(start, end):
         s = bins[at]
-        b = bucket(nears[s])
+        b = bucket(records[s, 1] >> 32)
         order[heads[b]] = s
         heads[b] += 1
 
@@ -378,15 +426,6 @@ def read_tile(left, top, right, bottom, prim_id, nearest, rest, words, floats):
                 words[2 * (at + k * LANES)] = ~prim_id[j, i, k]
                 floats[2 * (at + k * LANES) + 1] = nearest[j, i, k]
             floats[2 * (at + length * LANES) + 1] = rest[j, i]
-
-
-@inlined
-def transposed(a, b, c, d, e, f, g, h):
-    """Return eight vectors of LANES lanes as one, lane 0 of all of them first."""
-    return simd.interleave(
-        simd.interleave(simd.interleave(a, e), simd.interleave(c, g)),
-        simd.interleave(simd.interleave(b, f), simd.interleave(d, h)),
-    )
 
 
 @inlined
@@ -449,8 +488,8 @@ def aligned(n):
 
 @parallel_kernel
 def fill_lists(
-    vertices, faces, tile_start, bins, survivors, spans, nears, eye, m, frame, near, width, height,
-    margin, tiles_x, workers, fresh, prim_id, nearest, rest, planes,
+    corners, tile_start, bins, records, eye, m, frame, near, width, height, margin, tiles_x,
+    workers, fresh, prim_id, nearest, rest, planes,
 ):  # fmt: skip
     """Insert every bin's faces into the lists of its tile.
 
@@ -464,29 +503,23 @@ def fill_lists(
     most = 0
     for tile in range(tiles):
         most = max(most, tile_start[tile + 1] - tile_start[tile])
-    near_bits = nears.view(np.int32)
     taken = np.zeros(1, np.int64)
     for _ in prange(workers):
         owner = aligned(BLOCKS * (length + 1) * LANES)
         keys = borrowed(owner)
         words, floats = keys.view(np.int32), keys.view(np.float32)
         rows = aligned(ROWS * LANES).view(np.float64)
-        corners = aligned(9 * LANES // 2).view(np.float32)
-        boxes = aligned(4 * LANES // 2).view(np.int32)
-        drawn = aligned(4 * LANES // 2).view(np.int32)
-        kept = aligned(PLANE_ROW * LANES // 2).view(np.float32)
         starts = aligned(4 * LANES).view(np.float64)
         places = aligned(LANES).view(np.int32)
-        chosen = np.zeros(LANES, np.int64)
+        chosen, spans = np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
+        near_bits = np.zeros(LANES, np.int32)
+        nears = near_bits.view(np.float32)
         owner2 = aligned(BLOCKS // 2).view(np.int32)
         farthest = borrowed(owner2)
         owner3 = np.empty(BLOCKS, np.int64)
         filled = borrowed(owner3)
         order = np.empty(most, np.int32)
         heads = np.empty(BUCKETS + 1, np.int32)
-        corners[:] = np.float32(0.0)
-        boxes[:] = 0
-        drawn[:] = 0
         tile = fetch_add(taken.ctypes.data, 1)
         while tile < tiles:
             start, end = np.int64(tile_start[tile]), np.int64(tile_start[tile + 1])
@@ -501,45 +534,35 @@ def fill_lists(
                 else:
                     filled[:] = length + 1
                     read_tile(left, top, right, bottom, prim_id, nearest, rest, words, floats)
-                near_first(bins, start, end, near_bits, order, heads)
+                near_first(bins, start, end, records, order, heads)
                 at = np.int64(0)
                 while at < end - start:
                     count = 0
                     while count < LANES and at < end - start:
                         s = order[at]
                         at += 1
-                        i0, j0 = max(np.int64(spans[s, 0]), left), max(np.int64(spans[s, 1]), top)
-                        i1 = min(np.int64(spans[s, 2]), right - 1)
-                        j1 = min(np.int64(spans[s, 3]), bottom - 1)
-                        if near_bits[s] < hidden(left, top, i0, j0, i1, j1, farthest):
+                        span, word = records[s, 0], records[s, 1]
+                        i0, j0, i1, j1 = within(span, left, top, right, bottom)
+                        if word >> 32 < hidden(left, top, i0, j0, i1, j1, farthest):
                             continue
-                        chosen[count] = s
-                        face = survivors[s]
-                        for k in range(3):
-                            v = faces[face, k]
-                            corners[(3 * k) * LANES + count] = vertices[v, 0]
-                            corners[(3 * k + 1) * LANES + count] = vertices[v, 1]
-                            corners[(3 * k + 2) * LANES + count] = vertices[v, 2]
-                        for k in range(4):
-                            boxes[k * LANES + count] = spans[s, k]
-                        drawn[count], drawn[LANES + count] = i0, j0
-                        drawn[2 * LANES + count], drawn[3 * LANES + count] = i1, j1
+                        chosen[count], spans[count] = word & 0xFFFFFFFF, span
+                        near_bits[count] = word >> 32
                         count += 1
+                    if count == 0:
+                        break
+                    for lane in range(count, LANES):
+                        chosen[lane], spans[lane] = chosen[0], spans[0]
                     some = set_up(
-                        corners, boxes, drawn, eye, m, frame, near, width, height, margin, cx, cy,
-                        rows, kept,
+                        corners, chosen, spans, left, top, right, bottom, eye, m, frame, near,
+                        width, height, margin, cx, cy, rows, planes,
                     )  # fmt: skip
                     some &= (np.int64(1) << count) - 1
                     while some != 0:
                         lane = simd.lowest(some)
                         some &= some - 1
-                        face = survivors[chosen[lane]]
-                        for k in range(ERROR + 1):
-                            planes[face, k] = kept[k * LANES + lane]
+                        i0, j0, i1, j1 = within(spans[lane], left, top, right, bottom)
                         draw(
-                            face, nears[chosen[lane]], lane, rows, left, top,
-                            np.int64(drawn[lane]), np.int64(drawn[LANES + lane]),
-                            np.int64(drawn[2 * LANES + lane]), np.int64(drawn[3 * LANES + lane]),
+                            chosen[lane], nears[lane], lane, rows, left, top, i0, j0, i1, j1,
                             cx, cy, length, keys, filled, farthest, places, starts,
                         )  # fmt: skip
                 write_tile(

@@ -122,14 +122,15 @@ def face_box(a, b, c, boxes, flags, width, height):
 @parallel_kernel
 def cull_and_count(
     faces, first, last, boxes, flags, nearest, width, height, tiles_x, workers, chunk,
-    survivors, spans, nears, n_survivors, counts,
+    records, n_survivors, counts,
 ):  # fmt: skip
     """Find the faces first..last-1 that may touch a pixel, and count them in every tile.
 
-    Out come survivors (last - first,) int32, for each chunk at its own place, their boxes in spans
-    (last - first, 4) int16 and the nearest depths of their vertices in nears (last - first,)
-    float32, n_survivors (chunks,) int32 and counts (chunks, tiles) int32.
+    Out come, for each chunk at its own place, the records (last - first, 2) int64 of the faces: the
+    box, packed as those of vertices, and the bits of the nearest depth of the vertices, with the
+    number of the face in the lower half; n_survivors (chunks,) int32; counts (chunks, tiles) int32.
     """
+    depth_bits = nearest.view(np.int32)
     taken = np.zeros(1, np.int64)
     for _ in prange(workers):
         c = fetch_add(taken.ctypes.data, 1)
@@ -143,12 +144,9 @@ def cull_and_count(
                 some, i0, j0, i1, j1 = face_box(p, q, r, boxes, flags, width, height)
                 if not some:
                     continue
-                survivors[kept] = face
-                nears[kept] = max(nearest[p], nearest[q], nearest[r])
-                spans[kept, 0] = i0
-                spans[kept, 1] = j0
-                spans[kept, 2] = i1
-                spans[kept, 3] = j1
+                depth = max(depth_bits[p], depth_bits[q], depth_bits[r])
+                records[kept, 0] = i0 | (j0 << 16) | (i1 << 32) | (j1 << 48)
+                records[kept, 1] = (np.int64(depth) << 32) | np.int64(face)
                 kept += 1
                 for v in range(j0 >> TILE_BITS, (j1 >> TILE_BITS) + 1):
                     for u in range(i0 >> TILE_BITS, (i1 >> TILE_BITS) + 1):
@@ -158,7 +156,7 @@ def cull_and_count(
 
 
 @parallel_kernel
-def fill_bins(spans, n_survivors, tiles_x, workers, chunk, cursors, bins):
+def fill_bins(records, n_survivors, tiles_x, workers, chunk, cursors, bins):
     """Note the survivors, by their places, in every tile of their box.
 
     cursors (chunks, tiles) int32, made of the counts by `hybrid_rt.kernels.raster.prefix_sums`, are
@@ -170,8 +168,11 @@ def fill_bins(spans, n_survivors, tiles_x, workers, chunk, cursors, bins):
         while c < len(cursors):
             cursor = cursors[c]
             for s in range(c * chunk, c * chunk + n_survivors[c]):
-                for v in range(spans[s, 1] >> TILE_BITS, (spans[s, 3] >> TILE_BITS) + 1):
-                    for u in range(spans[s, 0] >> TILE_BITS, (spans[s, 2] >> TILE_BITS) + 1):
+                span = records[s, 0]
+                u0, u1 = (span & 0xFFFF) >> TILE_BITS, ((span >> 32) & 0xFFFF) >> TILE_BITS
+                v0, v1 = ((span >> 16) & 0xFFFF) >> TILE_BITS, span >> (48 + TILE_BITS)
+                for v in range(v0, v1 + 1):
+                    for u in range(u0, u1 + 1):
                         tile = v * tiles_x + u
                         bins[cursor[tile]] = s
                         cursor[tile] += 1
