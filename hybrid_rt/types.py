@@ -310,8 +310,9 @@ class PrimitiveLists:
     rest : (H, W) float32
         Upper bound of the depth of everything that is not in the list; 0 if that is nothing.
     planes : (F, 8) float32
-        For each face of the scene that touches the screen the plane of its depth, with its error;
-        see `hybrid_rt.kernels.lists.face_planes`. NaN where there is none to be trusted.
+        For each face that is in a list the plane of its depth, with its error; see
+        `hybrid_rt.kernels.lists`. NaN where there is none to be trusted. Rows of faces that are in
+        no list mean nothing.
     margin_px : float
     """
 

@@ -23,6 +23,16 @@ n = (b - a) x (c - a): the edges are differences of float32, rounded once, so n_
 than 4 e times its two products' sizes, whose sum over k is less than abs(b - a) abs(c - a) in sums
 of absolute coordinates; SLACK times that, times the sizes of r or of a, covers both scalar
 products, their 3 additions included.
+
+The sums are taken in parts: what an edge or the plane is at the corner of a block of pixels, plus
+what it gains from there to a pixel's centre. The plane is multiplied by the reciprocal of its
+denominator. No term of a sum is rounded more than seven times so; with what its coefficient errs
+by, 11 e for both, that is 18 e, below the 32 e of SLACK.
+
+Every pixel's list is sorted by *keys*: the bits of the bound, and below them the complement of the
+face's number, so that of equal bounds the smaller number comes first and the order of drawing does
+not show. A tile's faces are drawn from near to far all the same, because what is behind all that
+its pixels have already left out of their lists changes nothing.
 """
 
 from __future__ import annotations
@@ -52,7 +62,7 @@ PLANE, LIMIT, ROWS = 9, 12, 13
 # point, that point, error; padded so that no row lies across two cache lines. In the grown pixels
 # of the face's box, and for a place (x, y) off by no more than half of the margin, ``DEPTH +
 # SLOPE_X (x - REFERENCE_X) + SLOPE_Y (y - REFERENCE_Y)`` in float32 errs by less than ERROR. Faces
-# seen edge-on, or beside the screen, have NaN.
+# seen edge-on have NaN; the rows of faces that no tile has drawn stay as they were.
 SLOPE_X, SLOPE_Y, DEPTH, REFERENCE_X, REFERENCE_Y, ERROR, PLANE_ROW = 0, 1, 2, 3, 4, 5, 8
 
 BLOCK_X, BLOCK_Y = 4, 2
@@ -441,9 +451,14 @@ def write_block(i, j, start, keys, prim_id, nearest, rest):
     )  # fmt: skip
     bounds = simd.float_of_bits(
         transposed(
-            simd.to_i32(k0 >> 32), simd.to_i32(k1 >> 32), simd.to_i32(k2 >> 32),
-            simd.to_i32(k3 >> 32), simd.to_i32(k4 >> 32), simd.to_i32(k5 >> 32),
-            simd.to_i32(k6 >> 32), simd.to_i32(k7 >> 32),
+            simd.to_i32(k0 >> 32),
+            simd.to_i32(k1 >> 32),
+            simd.to_i32(k2 >> 32),
+            simd.to_i32(k3 >> 32),
+            simd.to_i32(k4 >> 32),
+            simd.to_i32(k5 >> 32),
+            simd.to_i32(k6 >> 32),
+            simd.to_i32(k7 >> 32),
         )  # fmt: skip
     )
     other = simd.float_of_bits(simd.to_i32(simd.load(keys, start + WHOLE * LANES, LANES) >> 32))

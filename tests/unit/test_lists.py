@@ -146,6 +146,56 @@ def test_threads_and_batches_change_nothing(monkeypatch):
         assert np.array_equal(getattr(one, name), getattr(split, name))
 
 
+def crowded(seed=9, n=900):
+    """Return a scene with some forty triangles in front of each other, and a camera."""
+    rng = np.random.default_rng(seed)
+    scene = random_scene(rng, n)
+    camera = hrt.Camera.look_at((0, 0, 5), (0, 0, 0), width=77, height=45, near=0.1)
+    return scene, camera
+
+
+@pytest.mark.parametrize("length", [1, 3, 7, 8, 20])
+def test_a_shorter_list_is_the_beginning_of_a_longer_one(length):
+    scene, camera = crowded()
+    short = hrt.rasterize(scene, camera, lists=length).lists
+    long = hrt.rasterize(scene, camera, lists=64).lists
+    assert (long.nearest[:, :, length] > 0).mean() > 0.3
+    assert np.array_equal(short.prim_id, long.prim_id[:, :, :length])
+    assert np.array_equal(short.nearest, long.nearest[:, :, :length])
+    assert np.array_equal(short.rest, long.nearest[:, :, length])
+
+
+def test_the_order_of_the_faces_changes_nothing():
+    scene, camera = crowded()
+    order = np.random.default_rng(1).permutation(len(scene.faces))
+    shuffled = hrt.Scene.from_arrays(scene.vertices, scene.faces[order])
+    one = hrt.rasterize(scene, camera, lists=8).lists
+    other = hrt.rasterize(shuffled, camera, lists=8).lists
+    assert np.array_equal(one.nearest, other.nearest)
+    assert np.array_equal(one.rest, other.rest)
+    # The numbers may differ where bounds are equal.
+    ties = (np.diff(one.nearest, axis=2) == 0).any(axis=2) | (one.nearest[:, :, 7] == one.rest)
+    assert ties.mean() < 0.6
+    renumbered = np.where(other.prim_id < 0, -1, order[other.prim_id])
+    assert np.array_equal(renumbered[~ties], one.prim_id[~ties])
+
+
+def test_of_equal_bounds_the_smaller_number_comes_first(monkeypatch):
+    from hybrid_rt import lists as module
+
+    scene, camera = crowded(n=60)
+    thrice = hrt.Scene.from_arrays(scene.vertices, np.tile(scene.faces, (3, 1)))
+    for batch in (1 << 21, 50):
+        monkeypatch.setattr(module, "BATCH_FACES", batch)
+        found = hrt.rasterize(thrice, camera, lists=5).lists
+        equal = (np.diff(found.nearest, axis=2) == 0) & (found.prim_id[:, :, 1:] >= 0)
+        assert equal.mean() > 0.1
+        assert (np.diff(found.prim_id, axis=2)[equal] > 0).all()
+        # Of three equal ones the first is in a list if any is.
+        listed = [set(ids[ids >= 0]) for ids in found.prim_id.reshape(-1, 5)]
+        assert all(i % 60 in ids and (i < 120 or i - 60 in ids) for ids in listed for i in ids)
+
+
 def test_a_triangle_with_two_equal_corners_is_nothing():
     camera = hrt.Camera.look_at((0, 0, 5), (0, 0, 0), width=16, height=16, near=0.1)
     corners = np.array([(-1.0, 0, 0), (1, 0, 0), (1, 0, 0)])

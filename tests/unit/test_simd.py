@@ -39,6 +39,7 @@ from hybrid_rt.kernels.simd import (
     i32,
     i64,
     insert,
+    interleave,
     iota,
     load,
     load_masked,
@@ -46,6 +47,7 @@ from hybrid_rt.kernels.simd import (
     mask_of_bits,
     maximum,
     minimum,
+    part,
     reduce_add,
     reduce_max,
     reduce_min,
@@ -599,6 +601,23 @@ def test_single_lanes(dtype):
         assert_same(out, wanted)
 
 
+@pytest.mark.parametrize("dtype", [*FLOATS, *INTS])
+@pytest.mark.parametrize("lanes", [2, 8, 32])
+def test_interleaving_and_parts(dtype, lanes):
+    @compiled
+    def run(a, b, out):
+        both = interleave(load(a, 0, lanes), load(b, 0, lanes))
+        store(out, 0, both)
+        store(out, 2 * lanes, part(both, 1, lanes))
+        store(out, 3 * lanes, part(both, 0, lanes))
+
+    a, b = np.arange(lanes).astype(dtype), np.arange(100, 100 + lanes).astype(dtype)
+    out = np.empty(4 * lanes, dtype)
+    run(a, b, out)
+    wanted = np.stack([a, b], axis=1).reshape(-1)
+    assert_same(out, np.concatenate([wanted, wanted[lanes:], wanted[:lanes]]))
+
+
 # What does not compile
 
 
@@ -628,6 +647,11 @@ def test_arrays_that_do_not_fit_are_refused():
     a.flags.writeable = False
     assert "writable" in refused(lambda a: store(a, 0, f32(1)), a)
     assert "writable" in refused(lambda a: scatter(a, iota(), f32(1), mask(True)), a)
+
+
+def test_parts_are_constant_and_in_range():
+    assert "from 0 to 1" in refused(lambda: part(f32(0, 8), 2, 4))
+    assert "from 0 to 1" in refused(lambda k: part(f32(0, 8), k, 4), 1)
 
 
 def test_lanes_are_a_constant_power_of_two():
