@@ -449,18 +449,12 @@ def write_block(i, j, start, keys, prim_id, nearest, rest):
         simd.to_i32(k0), simd.to_i32(k1), simd.to_i32(k2), simd.to_i32(k3),
         simd.to_i32(k4), simd.to_i32(k5), simd.to_i32(k6), simd.to_i32(k7),
     )  # fmt: skip
-    bounds = simd.float_of_bits(
-        transposed(
-            simd.to_i32(k0 >> 32),
-            simd.to_i32(k1 >> 32),
-            simd.to_i32(k2 >> 32),
-            simd.to_i32(k3 >> 32),
-            simd.to_i32(k4 >> 32),
-            simd.to_i32(k5 >> 32),
-            simd.to_i32(k6 >> 32),
-            simd.to_i32(k7 >> 32),
-        )  # fmt: skip
-    )
+    depths = transposed(
+        simd.to_i32(k0 >> 32), simd.to_i32(k1 >> 32), simd.to_i32(k2 >> 32),
+        simd.to_i32(k3 >> 32), simd.to_i32(k4 >> 32), simd.to_i32(k5 >> 32),
+        simd.to_i32(k6 >> 32), simd.to_i32(k7 >> 32),
+    )  # fmt: skip
+    bounds = simd.float_of_bits(depths)
     other = simd.float_of_bits(simd.to_i32(simd.load(keys, start + WHOLE * LANES, LANES) >> 32))
     width = rest.shape[1]
     upper, lower = j * width + i, (j + 1) * width + i
