@@ -88,8 +88,8 @@ def rasterize(
     _check.choice("derivatives", derivatives, ("plane", "quad"))
     length = _check.integer("lists", lists, least=0, most=MAX_LISTS)
     shape = (camera.height, camera.width)
-    depth, ddx, ddy = (np.zeros(shape, np.float32) for _ in range(3))
-    prim_id = np.full(shape, -1, np.int32)
+    depth, ddx, ddy = (np.empty(shape, np.float32) for _ in range(3))
+    prim_id = np.empty(shape, np.int32)
     with _threads.limited(threads) as lanes:
         _draw(scene, camera, lanes, depth, ddx, ddy, prim_id)
         if derivatives == "quad":
@@ -144,6 +144,6 @@ def _draw(
         )  # fmt: skip
         tile_kernels.draw_tiles(
             tile_start, bins, ints, floats, tiles_x, 0.5 * width, 0.5 * height, lanes,
-            depth, ddx, ddy, prim_id,
+            first == 0, depth, ddx, ddy, prim_id,
         )  # fmt: skip
         first = last

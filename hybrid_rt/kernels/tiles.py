@@ -10,9 +10,19 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
+from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._jit import inlined, parallel_kernel
+from hybrid_rt.kernels._queue import fetch_add
 from hybrid_rt.kernels.clip import HALF, SUBPIXEL_BITS
-from hybrid_rt.kernels.raster import TILE, TILE_BITS, edge, highest, lowest
+from hybrid_rt.kernels.raster import (
+    RECORD_FLOATS,
+    RECORD_INTS,
+    TILE,
+    TILE_BITS,
+    edge,
+    highest,
+    lowest,
+)
 
 BLOCK = 16
 """Pixels of a row that are drawn together."""
@@ -22,6 +32,10 @@ STRIDE = TILE + BLOCK
 """Keys in a row of a tile; blocks run over its right end."""
 OLD = (1 << 29) - 1
 """Rank of what an earlier batch has drawn. Record r has OLD - 1 - r: the smallest wins a tie."""
+LANES = 8
+LARGEST = float(np.finfo(np.float32).max)
+BUCKETS = 256
+"""Depths that a tile's records are sorted by, eight to each halving."""
 REVISION = 16
 """Records after which a tile finds out again behind which depth nothing can be seen."""
 
@@ -159,47 +173,104 @@ def farthest_of(keys, columns, rows, lowest_key):
     return unpack(farthest)[0]
 
 
+@inlined
+def bucket(depth):
+    """Return a number that is smaller for nearer depths."""
+    bits = np.int64(np.float32(depth).view(np.int32))
+    return min(max(0x3F8 - (bits >> 20), 0), BUCKETS - 1)
+
+
+@inlined
+def near_first(bins, start, end, floats, order, heads):
+    """Put the records of bins start..end-1 into `order`, roughly nearest first.
+
+    heads (BUCKETS + 1,) int32 is scratch. What is drawn does not depend on the order; what is near
+    hides what comes later.
+    """
+    heads[:] = 0
+    for at in range(start, end):
+        heads[bucket(floats[bins[at], 4]) + 1] += 1
+    for b in range(BUCKETS):
+        heads[b + 1] += heads[b]
+    for at in range(start, end):
+        b = bucket(floats[bins[at], 4])
+        order[heads[b]] = bins[at]
+        heads[b] += 1
+
+
+@inlined
+def write_tile(left, top, right, bottom, fresh, keys, ints, floats, depth, ddx, ddy, prim_id):
+    """Write the pixels of a tile that have something new, with `fresh` all of them."""
+    for j in range(bottom - top + 1):
+        for i in range(0, right - left + 1, LANES):
+            bits = simd.bits_i64(simd.load(keys, j * STRIDE + i, LANES))
+            rank = simd.to_i32(bits & OLD)
+            nearest = simd.to_f32(simd.float_of_bits(bits & ~OLD))
+            live = simd.first(right - left + 1 - i, LANES)
+            new = live & (nearest > np.float32(0.0)) & (rank != OLD)
+            record = (OLD - 1) - rank
+            face = simd.gather(ints, record * RECORD_INTS + 6, new, -1)
+            # The plane of a triangle seen edge-on can be steeper than float32 holds.
+            slope_x = simd.gather(floats, record * RECORD_FLOATS + 1, new, 0.0)
+            slope_x = simd.minimum(simd.maximum(slope_x, -LARGEST), LARGEST)
+            slope_y = simd.gather(floats, record * RECORD_FLOATS + 2, new, 0.0)
+            slope_y = simd.minimum(simd.maximum(slope_y, -LARGEST), LARGEST)
+            at = (top + j) * depth.shape[1] + left + i
+            written = live if fresh else new
+            simd.store_masked(depth, at, nearest, written)
+            simd.store_masked(ddx, at, simd.to_f32(slope_x), written)
+            simd.store_masked(ddy, at, simd.to_f32(slope_y), written)
+            simd.store_masked(prim_id, at, face, written)
+
+
 @parallel_kernel
-def draw_tiles(tile_start, bins, ints, floats, tiles_x, cx, cy, lanes, depth, ddx, ddy, prim_id):
-    """Draw every bin over what the images (H, W) already hold; (cx, cy) is the screen's centre."""
+def draw_tiles(
+    tile_start, bins, ints, floats, tiles_x, cx, cy, workers, fresh, depth, ddx, ddy, prim_id
+):  # fmt: skip
+    """Draw every bin over what the images (H, W) already hold; (cx, cy) is the screen's centre.
+
+    With `fresh` they hold nothing yet, and all pixels are written.
+    """
     height, width = depth.shape
     tiles = len(tile_start) - 1
-    largest = np.float64(np.finfo(np.float32).max)
-    for lane in prange(lanes):
+    most = 0
+    for tile in range(tiles):
+        most = max(most, tile_start[tile + 1] - tile_start[tile])
+    taken = np.zeros(1, np.int64)
+    for _ in prange(workers):
         keys = np.empty(TILE * STRIDE, np.float64)
         lowest_key = np.empty(TILE, np.float64)
-        for tile in range(lane, tiles, lanes):
-            if tile_start[tile] == tile_start[tile + 1]:
-                continue
-            left = (tile % tiles_x) << TILE_BITS
-            top = (tile // tiles_x) << TILE_BITS
-            right = min(left + TILE, width) - 1
-            bottom = min(top + TILE, height) - 1
-            keys[:] = 0.0
-            for j in range(bottom - top + 1):
-                for i in range(right - left + 1):
-                    old = depth[top + j, left + i]
-                    if old > 0.0:
-                        keys[j * STRIDE + i] = pack(old, OLD)
-            hidden = np.float32(0.0)
-            until = tile_start[tile] + REVISION
-            for at in range(tile_start[tile], tile_start[tile + 1]):
-                record = bins[at]
-                if at == until:
-                    hidden = farthest_of(keys, right - left + 1, bottom - top + 1, lowest_key)
-                    until += REVISION
-                if np.float32(floats[record, 4]) >= hidden:
-                    draw(record, ints, floats, left, top, right, bottom, cx, cy, keys)
-            for j in range(bottom - top + 1):
-                for i in range(right - left + 1):
-                    new, rank = unpack(keys[j * STRIDE + i])
-                    if new > 0.0 and rank != OLD:
-                        record = OLD - 1 - rank
-                        depth[top + j, left + i] = new
-                        prim_id[top + j, left + i] = ints[record, 6]
-                        # The plane of a triangle seen edge-on can be steeper than float32 holds.
-                        ddx[top + j, left + i] = min(max(floats[record, 1], -largest), largest)
-                        ddy[top + j, left + i] = min(max(floats[record, 2], -largest), largest)
+        order = np.empty(most, np.int32)
+        heads = np.empty(BUCKETS + 1, np.int32)
+        tile = fetch_add(taken.ctypes.data, 1)
+        while tile < tiles:
+            start, end = np.int64(tile_start[tile]), np.int64(tile_start[tile + 1])
+            if fresh or end > start:
+                left = (tile % tiles_x) << TILE_BITS
+                top = (tile // tiles_x) << TILE_BITS
+                right = min(left + TILE, width) - 1
+                bottom = min(top + TILE, height) - 1
+                keys[:] = 0.0
+                if not fresh:
+                    for j in range(bottom - top + 1):
+                        for i in range(right - left + 1):
+                            old = depth[top + j, left + i]
+                            if old > 0.0:
+                                keys[j * STRIDE + i] = pack(old, OLD)
+                near_first(bins, start, end, floats, order, heads)
+                hidden = np.float32(0.0)
+                until = REVISION
+                for at in range(end - start):
+                    record = order[at]
+                    if at == until:
+                        hidden = farthest_of(keys, right - left + 1, bottom - top + 1, lowest_key)
+                        until += REVISION
+                    if np.float32(floats[record, 4]) >= hidden:
+                        draw(record, ints, floats, left, top, right, bottom, cx, cy, keys)
+                write_tile(
+                    left, top, right, bottom, fresh, keys, ints, floats, depth, ddx, ddy, prim_id
+                )
+            tile = fetch_add(taken.ctypes.data, 1)
 
 
 @parallel_kernel
