@@ -41,14 +41,18 @@ def march(
         gbuffer = replace(gbuffer, lists=lists)
     if not pyramid.conservative:
         pyramid = build_depth_pyramid(gbuffer, conservative=True, threads=threads)
-    width, height = gbuffer.camera.width, gbuffer.camera.height
-    max_steps = 2 * (width + height) + 64 if mode.max_steps is None else mode.max_steps
+    camera = lists.camera
+    max_steps = mode.max_steps
+    if max_steps is None:
+        max_steps = 2 * (camera.width + camera.height) + 64
     limits = max_steps, mode.max_tests, any_hit
     if mode.vectors and _countable(rays, lists, pyramid):
-        return _in_lanes(
-            rays, gbuffer.scene, gbuffer.camera, lists, pyramid, limits, mode.probes, threads
-        )
-    return _one_by_one(rays, gbuffer.scene, gbuffer.camera, lists, pyramid, limits, threads)
+        marched = _in_lanes(rays, gbuffer.scene, lists, pyramid, limits, mode.probes, threads)
+    else:
+        marched = _one_by_one(rays, gbuffer.scene, lists, pyramid, limits, threads)
+    if camera != gbuffer.camera:
+        marched.pixel.fill(-1)
+    return marched
 
 
 def _countable(rays: Rays, lists: PrimitiveLists, pyramid: DepthPyramid) -> bool:
@@ -60,7 +64,6 @@ def _countable(rays: Rays, lists: PrimitiveLists, pyramid: DepthPyramid) -> bool
 def _in_lanes(
     rays: Rays,
     scene: Scene,
-    camera: Camera,
     lists: PrimitiveLists,
     pyramid: DepthPyramid,
     limits: tuple[int, int, bool],
@@ -68,6 +71,7 @@ def _in_lanes(
     threads: int | None,
 ) -> Marched:
     """March as many rays at a time as a vector has lanes."""
+    camera = lists.camera
     width, height = camera.width, camera.height
     columns, rows = bits(width, height)
     marched = Marched.unfilled(len(rays))
@@ -97,13 +101,13 @@ def _in_lanes(
 def _one_by_one(
     rays: Rays,
     scene: Scene,
-    camera: Camera,
     lists: PrimitiveLists,
     pyramid: DepthPyramid,
     limits: tuple[int, int, bool],
     threads: int | None,
 ) -> Marched:
     """March one ray after the other."""
+    camera = lists.camera
     # As the lanes, rays go up to the level at which the shorter axis is one cell.
     levels = min(bits(camera.width, camera.height)) + 1
     marched = Marched.unfilled(len(rays))

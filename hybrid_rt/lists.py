@@ -79,4 +79,4 @@ def primitive_lists(
                 planes.reshape(-1),
             )  # fmt: skip
             first = last
-    return PrimitiveLists(prim_id, nearest, rest, planes, margin)
+    return PrimitiveLists(prim_id, nearest, rest, planes, margin, camera)

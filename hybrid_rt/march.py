@@ -77,16 +77,18 @@ def march(
 
 
 def _check_pyramid(pyramid: Pyramid, gbuffer: GBuffer, mode: Mode) -> None:
-    """Raise unless `pyramid` is one that `mode` can go through, and of the size of `gbuffer`."""
+    """Raise unless `pyramid` is one that `mode` can go through, and of the right size."""
     if not (isinstance(mode, SlopeAware) and isinstance(pyramid, SlopePyramid)):
         _check.instance("pyramid", pyramid, DepthPyramid)
-    height, width = gbuffer.depth.shape
+    conservative = isinstance(pyramid, DepthPyramid) and pyramid.conservative
+    lists = gbuffer.lists if conservative else None
+    height, width = gbuffer.depth.shape if lists is None else lists.rest.shape
+    whose = "G-buffer" if lists is None else "G-buffer's lists"
     if (pyramid.heights[0], pyramid.widths[0]) != (height, width):
         raise ArgumentError(
             "pyramid",
-            f"the pyramid of the G-buffer, {width} by {height} pixels at level 0",
+            f"the pyramid of the {whose}, {width} by {height} pixels at level 0",
             f"one of {pyramid.widths[0]} by {pyramid.heights[0]}",
         )
-    conservative = isinstance(pyramid, DepthPyramid) and pyramid.conservative
     if conservative and not isinstance(mode, Certified):
         raise ArgumentError("pyramid", "one of the depths at pixel centres", "a conservative one")

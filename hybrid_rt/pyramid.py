@@ -20,7 +20,7 @@ def build_depth_pyramid(
     gbuffer : GBuffer
     conservative : bool
         Of the nearest depth anywhere in a pixel's square, from the G-buffer's lists, which mode
-        "certified" needs, instead of the depth at its centre.
+        "certified" needs, instead of the depth at its centre. It has the size of the lists.
     threads : int, optional
         Default: as many as Numba is set to.
 

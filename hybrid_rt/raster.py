@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from hybrid_rt import _check, _threads
+from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels import clip as clip_kernels
 from hybrid_rt.kernels import raster as kernels
 from hybrid_rt.kernels import tiles as tile_kernels
@@ -29,6 +30,7 @@ def rasterize(
     *,
     derivatives: Literal["plane", "quad"] = "plane",
     lists: int = 0,
+    lists_camera: Camera | None = None,
     threads: int | None = None,
 ) -> GBuffer:
     """Return the visible surface at every pixel's centre.
@@ -47,6 +49,11 @@ def rasterize(
     lists : int
         Longest list of primitives that is kept for each pixel square, 0 to 64, for mode
         "certified"; 8 bytes a primitive and pixel. 0, no lists, costs nothing.
+    lists_camera : Camera, optional
+        The view in whose pixels the lists are made; default: `camera`. Proofs need no pixel of the
+        image, so the lists may have larger pixels (``camera.resized(width // 4, height // 4)``:
+        cheaper to make and to walk through) or reach beyond the screen (``camera.widened(2.0)``:
+        rays that leave the screen stay in sight).
     threads : int, optional
         Default: as many as Numba is set to.
 
@@ -57,7 +64,8 @@ def rasterize(
     Raises
     ------
     ArgumentError
-        An argument of the wrong type, an unknown `derivatives`, `lists` or `threads` out of range.
+        An argument of the wrong type, an unknown `derivatives`, `lists` or `threads` out of range,
+        a `lists_camera` without lists.
 
     Notes
     -----
@@ -87,6 +95,10 @@ def rasterize(
     _check.instance("camera", camera, Camera)
     _check.choice("derivatives", derivatives, ("plane", "quad"))
     length = _check.integer("lists", lists, least=0, most=MAX_LISTS)
+    view = camera if lists_camera is None else lists_camera
+    _check.instance("lists_camera", view, Camera)
+    if lists_camera is not None and length == 0:
+        raise ArgumentError("lists_camera", "None where lists is 0", "a Camera")
     shape = (camera.height, camera.width)
     depth, ddx, ddy = (np.empty(shape, np.float32) for _ in range(3))
     prim_id = np.empty(shape, np.int32)
@@ -94,7 +106,7 @@ def rasterize(
         _draw(scene, camera, lanes, depth, ddx, ddy, prim_id)
         if derivatives == "quad":
             tile_kernels.quad_differences(depth, ddx, ddy)
-    found = primitive_lists(scene, camera, length, threads) if length else None
+    found = primitive_lists(scene, view, length, threads) if length else None
     return GBuffer(depth, ddx, ddy, prim_id, scene, camera, found)
 
 

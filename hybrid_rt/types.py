@@ -256,6 +256,27 @@ class Camera:
             height=_check.integer("height", height, least=1, most=32768),
         )
 
+    def widened(self, factor: float) -> Camera:
+        """Return a view `factor` times as wide and as high around the same axis.
+
+        Pixels stay as they are, so their number grows with the square of `factor`: with a factor
+        above 1 the view gets a border, a *guard band*.
+
+        Parameters
+        ----------
+        factor : float
+            > 0; the numbers of pixels are rounded.
+
+        Raises
+        ------
+        ArgumentError
+            `factor` out of range, or more pixels than a camera may have.
+        """
+        factor = _check.real("factor", factor, above=0.0)
+        height = max(1, round(self.height * factor))
+        wider = self.resized(max(1, round(self.width * factor)), height)
+        return replace(wider, vfov_deg=math.degrees(2.0 * math.atan(0.5 * height / self.focal_px)))
+
     @property
     def focal_px(self) -> float:
         """Distance of the image plane in pixels."""
@@ -314,6 +335,8 @@ class PrimitiveLists:
         `hybrid_rt.kernels.lists`. NaN where there is none to be trusted. Rows of faces that are in
         no list mean nothing.
     margin_px : float
+    camera : Camera
+        Whose pixels these are; not always that of the G-buffer, see `rasterize`.
     """
 
     prim_id: I32
@@ -321,6 +344,7 @@ class PrimitiveLists:
     rest: F32
     planes: F32
     margin_px: float
+    camera: Camera
 
     @property
     def length(self) -> int:
@@ -624,7 +648,8 @@ class Marched:
         Whether the march answers the ray, with a hit or, where `prim_id` is -1, with a miss. What
         resolves a ray is up to the mode.
     pixel : (N, 2) int32
-        The pixel (x, y) that answers the ray with a hit, else (-1, -1).
+        The pixel (x, y) that answers the ray with a hit, else (-1, -1). An answer from lists of
+        another view than the G-buffer's has none.
     prim_id : (N,) int32
         The primitive that is hit, -1 for a miss and for unresolved.
     t : (N,) float32

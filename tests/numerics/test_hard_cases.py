@@ -69,6 +69,19 @@ def graded(mode, name):
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_certified_is_right_from_lists_of_another_view(name):
+    case = built(name)
+    camera = case.camera
+    coarse = camera.resized(-(-camera.width // 4), -(-camera.height // 4))
+    mode = hrt.Certified(max_steps=case.max_steps)
+    for view in (coarse, camera.widened(1.5)):
+        gbuffer = hrt.rasterize(case.scene, camera, lists=8, lists_camera=view)
+        pyramid = hrt.build_depth_pyramid(gbuffer, conservative=True)
+        result = grade(case, hrt.march(case.rays, gbuffer, pyramid, mode), exact=True)
+        assert result.passed, result
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_case_is_not_vacuous(name):
     case = built(name)
     assert get_hard_case(name).what_goes_wrong.endswith(".")

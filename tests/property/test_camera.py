@@ -55,6 +55,25 @@ def test_directions_on_the_screen():
     np.testing.assert_allclose(hrt.project(camera, points), expected, atol=1e-12)
 
 
+@pytest.mark.parametrize("factor", [0.25, 1.0, 1.5, 3.0])
+def test_a_wider_view_shows_the_same_pixels(factor):
+    camera = hrt.Camera.look_at((1, 2, 3), (0, 0, -1), vfov_deg=70, width=64, height=48)
+    wide = camera.widened(factor)
+    assert (wide.width, wide.height) == (64 * factor, 48 * factor)
+    np.testing.assert_allclose(wide.focal_px, camera.focal_px, rtol=1e-14)
+    points = np.random.default_rng(0).normal(size=(50, 3))
+    border = 0.5 * np.array([wide.width - 64, wide.height - 48])
+    there = hrt.project(camera, points)
+    there[:, :2] += border
+    np.testing.assert_allclose(hrt.project(wide, points), there, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0, np.nan, np.inf, 1e6, "2"])
+def test_a_view_is_not_widened_by(factor):
+    with pytest.raises(hrt.ArgumentError, match=r"factor|width"):
+        hrt.Camera.look_at((0, 0, 0), (0, 0, -1)).widened(factor)
+
+
 @pytest.mark.parametrize(
     ("kwargs", "message"),
     [

@@ -17,8 +17,8 @@ def kernel(request, monkeypatch):
         monkeypatch.setattr("hybrid_rt.certified._countable", lambda *_: False)
 
 
-def prepare(scene, camera, lists=4):
-    gbuffer = hrt.rasterize(scene, camera, lists=lists)
+def prepare(scene, camera, lists=4, lists_camera=None):
+    gbuffer = hrt.rasterize(scene, camera, lists=lists, lists_camera=lists_camera)
     return gbuffer, hrt.build_depth_pyramid(gbuffer, conservative=True)
 
 
@@ -95,6 +95,66 @@ def test_every_answer_is_the_exact_one(seed):
     marched = certified(scene, camera, rays, (1, 2, 4, 16)[seed % 4], any_hit=any_hit)
     assert_true(scene, rays, marched, any_hit)
     assert marched.resolved.any()
+
+
+def other_views(camera):
+    """Return views in whose pixels lists can be made: coarse, wide, both, from another eye."""
+    eye = np.add(camera.eye, (0.3, 0.1, -0.5))
+    return (
+        camera.resized(max(1, camera.width // 4), max(1, camera.height // 4)),
+        camera.widened(2.0),
+        camera.widened(1.7).resized(5, 9),
+        camera.resized(1, 1),
+        hrt.Camera.look_at(eye, (0, 0.4, -1), vfov_deg=100, width=31, height=18, near=0.02),
+    )
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_every_answer_from_lists_of_another_view_is_the_exact_one(seed):
+    rng = np.random.default_rng(100 + seed)
+    scene = random_scene(rng, 24)
+    camera = hrt.Camera.look_at((0.1, 0.2, 5), (0.2, 0, -1), vfov_deg=50, width=24, height=16)
+    rays = random_rays(rng, scene, camera, 150)
+    view = other_views(camera)[seed % 5]
+    gbuffer, pyramid = prepare(scene, camera, (2, 16)[seed % 2], view)
+    assert gbuffer.lists.camera == view
+    assert pyramid.level(0).shape == (view.height, view.width)
+    marched = hrt.march(rays, gbuffer, pyramid, "certified")
+    assert_true(scene, rays, marched)
+    assert marched.resolved.any()
+    assert (marched.pixel == -1).all()
+    plain = hrt.rasterize(scene, camera)
+    assert np.array_equal(gbuffer.depth, plain.depth)
+    result = hrt.trace_hybrid(rays, gbuffer, pyramid, hrt.BruteForceTracer(scene), "certified")
+    assert_true(scene, rays, result.marched)
+    assert np.array_equal(result.hits.prim_id, hrt.BruteForceTracer(scene).intersect(rays).prim_id)
+
+
+def test_a_guard_band_keeps_rays_in_sight_that_leave_the_screen():
+    rng = np.random.default_rng(5)
+    scene = random_scene(rng, 60, spread=3.0, sliver=0.0)
+    camera = hrt.Camera.look_at((0, 0, 9), (0, 0, 0), vfov_deg=20, width=64, height=48)
+    rays = hrt.mirror_rays(hrt.rasterize(scene, camera))
+    gone, alpha = [], []
+    for factor in (1.0, 2.0, 4.0):
+        gbuffer, pyramid = prepare(scene, camera, 16, camera.widened(factor))
+        marched = hrt.march(rays, gbuffer, pyramid, "certified")
+        gone.append((marched.status == S.OFFSCREEN).mean())
+        alpha.append(marched.resolved.mean())
+    assert gone[0] > gone[1] > gone[2]
+    assert alpha[0] < alpha[1] < alpha[2]
+
+
+def test_lists_of_another_view_that_cannot_be():
+    scene = scene_of(wall())
+    with pytest.raises(hrt.ArgumentError, match="lists_camera: expected None where lists is 0"):
+        hrt.rasterize(scene, CAMERA, lists_camera=CAMERA)
+    with pytest.raises(hrt.ArgumentError, match="lists_camera: expected a Camera"):
+        hrt.rasterize(scene, CAMERA, lists=4, lists_camera="wide")
+    gbuffer, pyramid = prepare(scene, CAMERA, 4, CAMERA.resized(8, 4))
+    rays = hrt.mirror_rays(gbuffer)
+    with pytest.raises(hrt.ArgumentError, match="of the G-buffer's lists, 16 by 16 pixels"):
+        hrt.march(rays, hrt.rasterize(scene, CAMERA, lists=4), pyramid, "certified")
 
 
 def test_long_lists_answer_what_short_ones_cannot():

@@ -12,7 +12,7 @@ import pytest
 
 import hybrid_rt as hrt
 from hybrid_rt_scenes.hard_cases import get_hard_case, hard_case_names
-from unit.test_certified import prepare, random_rays
+from unit.test_certified import other_views, prepare, random_rays
 from unit.test_lists import random_scene
 from unit.test_simd import MACHINES, machine
 
@@ -43,6 +43,15 @@ def assert_vectors_change_nothing(rays, gbuffer, pyramid, any_hit=False, **param
     assert lanes.steps_by_level is None
     assert single.steps_by_level.sum() == single.steps.sum()
     return lanes
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_lists_of_another_view(seed):
+    rng = np.random.default_rng(700 + seed)
+    scene = random_scene(rng, 80)
+    camera = hrt.Camera.look_at((0, 0, 6), (0, 0, 0), width=40, height=24)
+    gbuffer, pyramid = prepare(scene, camera, 8, other_views(camera)[seed])
+    assert_vectors_change_nothing(odd_rays(rng, scene, camera, 400), gbuffer, pyramid)
 
 
 def odd_rays(rng, scene, camera, n):
