@@ -14,7 +14,17 @@ from hybrid_rt.kernels import certified_simd as simd_kernels
 from hybrid_rt.lists import primitive_lists
 from hybrid_rt.modes import Certified
 from hybrid_rt.pyramid import bits, build_depth_pyramid
-from hybrid_rt.types import F64, Camera, DepthPyramid, GBuffer, Marched, PrimitiveLists, Rays, Scene
+from hybrid_rt.types import (
+    F64,
+    Camera,
+    DepthPyramid,
+    GBuffer,
+    Marched,
+    MarchWork,
+    PrimitiveLists,
+    Rays,
+    Scene,
+)
 
 LENGTH = 8
 """Length of the lists that are made where a G-buffer has none."""
@@ -76,7 +86,7 @@ def _in_lanes(
     columns, rows = bits(width, height)
     marched = Marched.unfilled(len(rays))
     with _threads.limited(threads) as workers:
-        tests = np.zeros(workers, np.int64)
+        counted = np.zeros((workers, simd_kernels.COUNTERS), np.int64)
         simd_kernels.march(
             workers,
             tuple(_flat(a) for a in (rays.origin, rays.direction, rays.t_near, rays.t_far)),
@@ -93,9 +103,10 @@ def _in_lanes(
             *limits,
             probes,
             marched.rows,
-            tests,
+            counted,
         )
-    return replace(marched, tests=int(tests.sum()))
+    work = MarchWork(simd_kernels.W, *map(int, counted.sum(axis=0)))
+    return replace(marched, tests=work.tests, work=work)
 
 
 def _one_by_one(

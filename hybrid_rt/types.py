@@ -636,6 +636,64 @@ class MarchStatus(enum.IntEnum):
     """Certified only: not marched, since no probe near it in the order of the rays was resolved."""
 
 
+@dataclass(frozen=True)
+class MarchWork:
+    """What the lanes of a march went through, over all rays and workers.
+
+    A stage goes through vectors of `lanes` lanes, of which some are at work. All but the numbers of
+    vectors are the same however rays are put into lanes.
+
+    Attributes
+    ----------
+    lanes : int
+        Of a vector.
+    step_vectors, steps, passes : int
+        Steps read the pyramid, passes leave a pixel that has been looked at.
+    refills : int
+        Lanes that were given a ray to walk.
+    look_vectors, looks : int
+        Pixels whose lists were looked at, once for each time that a ray was sent there.
+    entry_vectors, entries : int
+        Entries of lists that were read.
+    rests : int
+        Lists that were gone through to their end.
+    plane_vectors, planes : int
+        Planes of triangles that were read.
+    test_vectors, tests : int
+        Exact tests.
+    """
+
+    lanes: int
+    step_vectors: int
+    steps: int
+    passes: int
+    refills: int
+    look_vectors: int
+    looks: int
+    entry_vectors: int
+    entries: int
+    rests: int
+    plane_vectors: int
+    planes: int
+    test_vectors: int
+    tests: int
+
+    @property
+    def busy(self) -> dict[str, float]:
+        """Share of the lanes at work, for each stage; NaN for one that nothing came to."""
+        stages = {
+            "step": (self.steps + self.passes, self.step_vectors),
+            "look": (self.looks, self.look_vectors),
+            "entry": (self.entries, self.entry_vectors),
+            "plane": (self.planes, self.plane_vectors),
+            "test": (self.tests, self.test_vectors),
+        }
+        return {
+            stage: at_work / (vectors * self.lanes) if vectors else math.nan
+            for stage, (at_work, vectors) in stages.items()
+        }
+
+
 @dataclass(frozen=True, eq=False)
 class Marched:
     """What the screen says about each ray.
@@ -662,6 +720,8 @@ class Marched:
         The same, summed over the rays, for each level; None where it was not counted.
     tests : int
         Exact tests of a ray against a primitive, over all rays; only mode "certified" makes any.
+    work : MarchWork, optional
+        What the lanes went through; None where the march has none.
     """
 
     status: U8
@@ -673,6 +733,7 @@ class Marched:
     steps: I32
     steps_by_level: I64 | None = None
     tests: int = 0
+    work: MarchWork | None = None
 
     @classmethod
     def unfilled(cls, n: int) -> Marched:

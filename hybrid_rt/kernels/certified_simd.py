@@ -70,6 +70,20 @@ BEST, BEST_X, BEST_Y, CODE, I32_ROWS = range(10, 15)
 # float64: what leads from s to t, limits, the shear of the exact test; bounds of the best hit's t.
 SCALE, Z, GZ, T_NEAR, T_FAR, SHEAR_X, SHEAR_Y, SHEAR_Z, LOW, HIGH, F64_ROWS = range(11)
 
+# What a worker counts, int64: of each stage the vectors that it went through and the lanes of them
+# that were at work. A step reads the pyramid; a pass leaves a pixel that has been looked at.
+# REFILLS are lanes given a ray, RESTS lists gone through to their end. As the fields of MarchWork.
+N_STEP_VECTORS, N_STEPS, N_PASSES, N_REFILLS, N_LOOK_VECTORS, N_LOOKS = range(6)
+N_ENTRY_VECTORS, N_ENTRIES, N_RESTS, N_PLANE_VECTORS, N_PLANES = range(6, 11)
+N_TEST_VECTORS, N_TESTS, COUNTERS = range(11, 14)
+
+# What a busy lane gathers, for those who reckon what a march must read: numbers of the arrays of
+# the view and the scene, and rows of slots (one of a test's is read by `look`, those of hits are
+# left out). tests/unit/test_certified_simd.py counts them in the sources of the stages.
+CELLS_A_STEP, ROWS_A_REFILL = 1, 14
+NUMBERS_AN_ENTRY, NUMBERS_A_REST, NUMBERS_A_PLANE, ROWS_A_LOOK = 2, 1, 6, 16
+NUMBERS_A_TEST, ROWS_A_TEST = 9, 13
+
 PASSED = -1
 """Level of a ray that nothing in its pixel stops any more."""
 ARRIVED = -1
@@ -333,7 +347,7 @@ def append(queue, many, slot, m):
 
 @kernel
 def step(
-    ready, n_ready, looks, n_looks, more, slots_f, slots_i, shape, cells, bits, max_steps
+    ready, n_ready, looks, n_looks, more, slots_f, slots_i, shape, cells, bits, max_steps, work,
 ):  # fmt: skip
     """Walk the rays of `ready` until they end or, going to `looks`, something may be in their way.
 
@@ -350,6 +364,7 @@ def step(
     code, steps = simd.i32(ARRIVED), simd.i32(0)
     active, passed, stopped, ended = none, none, none, none
     taken = 0
+    vectors, walked, passes = 0, 0, 0
     while True:
         idle = W - simd.count(active)
         over = taken == n_ready
@@ -366,6 +381,11 @@ def step(
                 n_looks = append(looks, n_looks, slot, stopped)
                 leave(slots_i, ENTRY, slot, simd.i32(0), stopped)
                 leave(slots_i, CODE, slot, code, ended)
+            if leaving or over:
+                work[N_STEP_VECTORS] += vectors
+                work[N_STEPS] += walked
+                work[N_PASSES] += passes
+                work[N_REFILLS] += taken
             if leaving:
                 leave(slots_i, LEVEL, slot, level, active)
                 return append(ready, 0, slot, active), n_looks
@@ -392,6 +412,7 @@ def step(
             steps = simd.gather(slots_i, slot + I32(STEPS * STRIDE), fresh, steps)
             code = simd.select(fresh, I32(ARRIVED), code)
             passed = fresh & (level == I32(PASSED))
+            passes += simd.count(passed)
             level = simd.select(passed, I32(0), level)
             active = active | fresh
         lx, ly = cx >> level, cy >> level
@@ -406,6 +427,8 @@ def step(
         active = active & ~tired
         new = new & ~tired
         steps = simd.select(new, steps + I32(1), steps)
+        vectors += 1
+        walked += simd.count(new)
         size = simd.i32(row_bits + column_bits) - (level + level)
         cell = (simd.i32(1) << size) + (ly << (simd.i32(column_bits) - level)) + lx
         near = simd.gather(cells, cell, new, F32(0.0))
@@ -445,7 +468,7 @@ def step(
 @kernel
 def look(
     looks, n_looks, ready, n_ready, tests, slots_f, slots_i, prim_id, nearest, rest, planes, shape,
-    max_tests,
+    max_tests, work,
 ):  # fmt: skip
     """Go through the lists of the pixels that the rays of `looks` have come to.
 
@@ -454,6 +477,7 @@ def look(
     """
     width, _, length, _ = shape
     n_tests = 0
+    rounds, entries, rests, plane_vectors, rows = 0, 0, 0, 0, 0
     for k in range(0, n_looks, W):
         live = simd.first(n_looks - k)
         slot = simd.load(looks, k)
@@ -480,11 +504,14 @@ def look(
         while simd.any_(seek):
             full = seek & (entry == I32(length))
             if simd.any_(full):
+                rests += simd.count(full)
                 others = simd.gather(rest, pixel, full, F32(0.0))
                 hidden = full & ~(lowest > others)
                 leave(slots_i, CODE, slot, simd.i32(HIDDEN), hidden)
                 past = past | (full & ~hidden)
                 seek = seek & ~full
+            rounds += 1
+            entries += simd.count(seek)
             place = pixel * I32(length) + entry
             found = simd.gather(prim_id, place, seek, found)
             bound = simd.gather(nearest, place, seek, F32(0.0))
@@ -494,6 +521,8 @@ def look(
             entry = simd.select(seek, entry + I32(1), entry)
             there = seek & (found != prim) & (found != best)
             if simd.any_(there):
+                plane_vectors += 1
+                rows += simd.count(there)
                 row = found * I32(PLANE_ROW)
                 a = simd.gather(planes, row + I32(SLOPE_X), there, F32(0.0))
                 b = simd.gather(planes, row + I32(SLOPE_Y), there, F32(0.0))
@@ -518,11 +547,18 @@ def look(
                     n_tests = append(tests, n_tests, slot, there)
         leave(slots_i, LEVEL, slot, simd.i32(PASSED), past)
         n_ready = append(ready, n_ready, slot, past)
+    work[N_LOOK_VECTORS] += -(-n_looks // W)
+    work[N_LOOKS] += n_looks
+    work[N_ENTRY_VECTORS] += rounds
+    work[N_ENTRIES] += entries
+    work[N_RESTS] += rests
+    work[N_PLANE_VECTORS] += plane_vectors
+    work[N_PLANES] += rows
     return n_ready, n_tests
 
 
 @kernel
-def test(tests, n_tests, looks, slots_f, slots_i, slots_d, corners, any_hit):
+def test(tests, n_tests, looks, slots_f, slots_i, slots_d, corners, any_hit, work):
     """Intersect the rays of `tests` with their primitives; they go on to `looks` or end.
 
     Return how many are in `looks`.
@@ -564,15 +600,17 @@ def test(tests, n_tests, looks, slots_f, slots_i, slots_d, corners, any_hit):
                 end = at(slots_f, END, slot, sooner)
                 leave(slots_f, END, slot, simd.minimum(cut, end), sooner)
         n_looks = append(looks, n_looks, slot, on)
+    work[N_TEST_VECTORS] += -(-n_tests // W)
+    work[N_TESTS] += n_tests
     return n_looks
 
 
 @kernel
 def walk(
     many, slots_f, slots_i, slots_d, ready, looks, tests, prim_id, nearest, rest, planes,
-    shape, cells, bits, corners, max_steps, max_tests, any_hit,
+    shape, cells, bits, corners, max_steps, max_tests, any_hit, work,
 ):  # fmt: skip
-    """March the rays of slots 0..many-1 to their ends; return the number of exact tests.
+    """March the rays of slots 0..many-1 to their ends; what it took is added to work (COUNTERS,).
 
     prim_id, nearest (H * W * K,), rest (H * W,); cells and bits: a pyramid and the two logarithms
     of its size; ready, looks, tests: scratch (STRIDE,) int32.
@@ -580,19 +618,16 @@ def walk(
     for k in range(many):
         ready[k] = k
     n_ready, n_looks = many, 0
-    total = 0
     while n_ready > 0 or n_looks > 0:
         n_ready, n_looks = step(
             ready, n_ready, looks, n_looks, n_looks > 0, slots_f, slots_i, shape, cells, bits,
-            max_steps,
+            max_steps, work,
         )  # fmt: skip
         n_ready, n_tests = look(
             looks, n_looks, ready, n_ready, tests, slots_f, slots_i, prim_id, nearest, rest,
-            planes, shape, max_tests,
+            planes, shape, max_tests, work,
         )  # fmt: skip
-        total += n_tests
-        n_looks = test(tests, n_tests, looks, slots_f, slots_i, slots_d, corners, any_hit)
-    return total
+        n_looks = test(tests, n_tests, looks, slots_f, slots_i, slots_d, corners, any_hit, work)
 
 
 @kernel
@@ -644,12 +679,11 @@ def write(many, slots_f, slots_i, slots_d, out):
 @kernel
 def march_some(
     order, many, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits, corners,
-    max_steps, max_tests, any_hit, slots_f, slots_i, slots_d, ready, looks, tried, out,
+    max_steps, max_tests, any_hit, slots_f, slots_i, slots_d, ready, looks, tried, out, work,
 ):  # fmt: skip
-    """March the rays order[:many]; return exact tests. `order` has W more rows than are used."""
+    """March the rays order[:many]. `order` has W more rows than are used."""
     how = np.empty(W, np.int32)
     free = np.empty(W, np.float32)
-    tests = 0
     filled = 0
     for k in range(0, many, W):
         placed = set_up(
@@ -662,14 +696,13 @@ def march_some(
                 if how[lane] >= 0:
                     unmarched(order[k + lane], how[lane], free[lane], out)
         if filled > BATCH - W or k + W >= many:
-            tests += walk(
+            walk(
                 filled, slots_f, slots_i, slots_d, ready, looks, tried,
                 prim_id, nearest, rest, planes, shape, cells, bits, corners,
-                max_steps, max_tests, any_hit,
+                max_steps, max_tests, any_hit, work,
             )  # fmt: skip
             write(filled, slots_f, slots_i, slots_d, out)
             filled = 0
-    return tests
 
 
 @inlined
@@ -692,9 +725,9 @@ GROUP = 16
 @parallel_kernel
 def march(
     workers, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits, corners,
-    max_steps, max_tests, any_hit, probes, out, tests,
+    max_steps, max_tests, any_hit, probes, out, work,
 ):  # fmt: skip
-    """March rays (N, 3); outputs (N,), tests (workers,).
+    """March rays (N, 3); outputs (N,), work (workers, COUNTERS).
 
     Of each GROUP of rays `probes` are marched first, and the others only if one of these was
     resolved.
@@ -718,10 +751,10 @@ def march(
             for i in range(first + apart // 2, last, apart):
                 order[many] = i
                 many += 1
-            tests[worker] += march_some(
+            march_some(
                 order, many, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits,
                 corners, max_steps, max_tests, any_hit,
-                slots_f, slots_i, slots_d, ready, looks, tried, out,
+                slots_f, slots_i, slots_d, ready, looks, tried, out, work[worker],
             )  # fmt: skip
             many = 0
             for group in range(first, last, GROUP):
@@ -737,9 +770,9 @@ def march(
                         many += 1
                     else:
                         unmarched(i, SKIPPED, F32(0.0), out)
-            tests[worker] += march_some(
+            march_some(
                 order, many, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits,
                 corners, max_steps, max_tests, any_hit,
-                slots_f, slots_i, slots_d, ready, looks, tried, out,
+                slots_f, slots_i, slots_d, ready, looks, tried, out, work[worker],
             )  # fmt: skip
             first = fetch_add(taken.ctypes.data, CHUNK)

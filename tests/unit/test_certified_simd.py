@@ -3,6 +3,8 @@
 What these answers are worth is tested in test_certified.py, for both.
 """
 
+import dataclasses
+import inspect
 import os
 import subprocess
 import sys
@@ -11,6 +13,7 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
+from hybrid_rt.kernels import certified_simd as lanes_of
 from hybrid_rt_scenes.hard_cases import get_hard_case, hard_case_names
 from unit.test_certified import other_views, prepare, random_rays
 from unit.test_lists import random_scene
@@ -31,6 +34,19 @@ def assert_same(one, other, rows=slice(None)):
         np.testing.assert_array_equal(a.view(bits), b.view(bits), err_msg=name)
 
 
+def assert_work_is_that_of(marched):
+    """What the lanes counted fits the march, and together."""
+    work = marched.work
+    assert work.lanes == lanes_of.W
+    assert work.steps == marched.steps.sum()
+    assert work.tests == marched.tests
+    assert work.passes <= work.looks <= work.steps + work.tests
+    assert work.rests <= work.looks
+    assert work.tests <= work.planes <= work.entries
+    assert all(np.isnan(share) or 0 < share <= 1 for share in work.busy.values())
+    assert np.isnan(work.busy["step"]) == (work.steps == 0)
+
+
 def assert_vectors_change_nothing(rays, gbuffer, pyramid, any_hit=False, **parameters):
     lanes, single = (
         hrt.march(
@@ -40,6 +56,8 @@ def assert_vectors_change_nothing(rays, gbuffer, pyramid, any_hit=False, **param
     )
     assert_same(lanes, single)
     assert lanes.tests == single.tests
+    assert single.work is None
+    assert_work_is_that_of(lanes)
     assert lanes.steps_by_level is None
     assert single.steps_by_level.sum() == single.steps.sum()
     return lanes
@@ -121,6 +139,30 @@ def test_threads_change_nothing(probes):
     one, two = (hrt.march(rays, gbuffer, pyramid, mode, threads=threads) for threads in (1, 2))
     assert_same(one, two)
     assert one.tests == two.tests
+    done, again = (dataclasses.asdict(marched.work) for marched in (one, two))
+    for name in (name for name in done if not name.endswith("vectors")):
+        assert done[name] == again[name], name
+    assert done["tests"] > 0
+
+
+def test_what_a_lane_gathers_is_what_is_written_down():
+    step, look, test, corner = (
+        inspect.getsource(stage.py_func)
+        for stage in (lanes_of.step, lanes_of.look, lanes_of.test, lanes_of.corner)
+    )
+    corners = inspect.getsource(lanes_of.test_primitives.py_func).count(" corner(")
+    assert step.count("gather(cells") == lanes_of.CELLS_A_STEP
+    assert step.count("gather(slots_") == lanes_of.ROWS_A_REFILL
+    of_entry = look.count("gather(prim_id") + look.count("gather(nearest")
+    assert of_entry == lanes_of.NUMBERS_AN_ENTRY
+    assert look.count("gather(rest") == lanes_of.NUMBERS_A_REST
+    assert look.count("gather(planes") == lanes_of.NUMBERS_A_PLANE
+    assert look.count(" at(slots_") == lanes_of.ROWS_A_LOOK + 1
+    of_hit = test[test.index("if simd.any_(hit)") :].count("at(slots_")
+    assert test.count("at(slots_") - of_hit == lanes_of.ROWS_A_TEST - 1
+    assert corners * corner.count("gather(corners") == lanes_of.NUMBERS_A_TEST
+    written = sum(stage.count("gather(") for stage in (step, look))
+    assert written == 1 + 14 + 2 + 1 + 6  # whatever else is gathered is to be added to them
 
 
 PROGRAM = """
