@@ -120,6 +120,8 @@ def run(
     * `hybrid-rt run scaling --series triangles --triangles 2^10..2^20` - growth over one axis
 
     * `hybrid-rt run peers --quick` - the same rays and pictures through other programs
+
+    * `hybrid-rt run roofline --quick` - what the certified march reads, takes and may take
     """
     from hybrid_rt_bench.kinds import RUNNERS
     from hybrid_rt_bench.progress import Reporter

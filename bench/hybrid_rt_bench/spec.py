@@ -24,6 +24,7 @@ from hybrid_rt_bench.spec_base import (
     SceneExperiment,
 )
 from hybrid_rt_bench.spec_peers import PeersExperiment
+from hybrid_rt_bench.spec_roofline import RooflineExperiment
 from hybrid_rt_bench.spec_scaling import ScalingExperiment
 from hybrid_rt_bench.spec_stability import StabilityExperiment
 
@@ -78,6 +79,7 @@ KINDS: dict[str, type[AnyExperiment]] = {
     "stability": StabilityExperiment,
     "scaling": ScalingExperiment,
     "peers": PeersExperiment,
+    "roofline": RooflineExperiment,
 }
 """The class of each kind of experiment."""
 

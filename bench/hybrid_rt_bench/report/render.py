@@ -14,6 +14,8 @@ from hybrid_rt_bench.report import (
     pareto,
     peers,
     pictures,
+    roofline,
+    roofline_figures,
     scaling,
     scaling_figures,
     stability,
@@ -45,6 +47,7 @@ FORMS = {
     "stability": Form(stability.tables, (stability.figures,)),
     "scaling": Form(scaling.tables, (scaling_figures.plots,)),
     "peers": Form(peers.tables, (peers.figures,)),
+    "roofline": Form(roofline.tables, (roofline_figures.plots,)),
 }
 """The form of each kind of run."""
 
