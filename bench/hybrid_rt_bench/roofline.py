@@ -51,23 +51,31 @@ def ns_element(rates: Sequence[Mapping[str, Any]], size: float, threads: int) ->
     return float(next((ns for held, ns in table if held >= size), table[-1][1]))
 
 
-def gather_ns(
-    rates: Sequence[Mapping[str, Any]], row: Mapping[str, Any], structure: str, *, near: bool
-) -> float:
-    """Return what a ray's gathers from a structure would take alone, ns.
+def far_ns(rates: Sequence[Mapping[str, Any]], row: Mapping[str, Any], structure: str) -> float:
+    """Return what a ray's gathers from a structure would take alone, at random places, ns.
 
     The first of the numbers that lie side by side is gathered at the rate of the working set, the
-    others at the fastest rate of all. With `near`, all are.
+    others at the fastest rate of all.
     """
-    threads, rays = int(row["threads"]), float(row["rays"])
-    fastest = min(ns_element(rates, r["bytes"], threads) for r in rates)
-    there = fastest if near else ns_element(rates, float(row[f"{structure}_bytes"]), threads)
+    threads = int(row["threads"])
+    there = ns_element(rates, float(row[f"{structure}_bytes"]), threads)
     places, numbers = float(row[f"{structure}_places"]), float(row[f"{structure}_gathered"])
-    return (places * there + (numbers - places) * fastest) / rays
+    return (places * there + (numbers - places) * _fastest(rates, threads)) / float(row["rays"])
 
 
-def floor_ns(
-    rates: Sequence[Mapping[str, Any]], row: Mapping[str, Any], *, near: bool = False
-) -> float:
-    """Return what all gathers of a ray would take alone, ns; `near` as in `gather_ns`."""
-    return sum(gather_ns(rates, row, structure, near=near) for structure in STRUCTURES)
+def far_gathers_ns(rates: Sequence[Mapping[str, Any]], row: Mapping[str, Any]) -> float:
+    """Return what all gathers of a ray would take alone, at random places, ns."""
+    return sum(far_ns(rates, row, structure) for structure in STRUCTURES)
+
+
+def near_gathers_ns(rates: Sequence[Mapping[str, Any]], row: Mapping[str, Any]) -> float:
+    """Return what a ray's gathers would take at the fastest rate of all, ns: a lower bound.
+
+    The march's own slots are left out, which are a matter of how its work is put in order.
+    """
+    numbers = sum(float(row[f"{name}_gathered"]) for name in STRUCTURES if name != "slots")
+    return numbers * _fastest(rates, int(row["threads"])) / float(row["rays"])
+
+
+def _fastest(rates: Sequence[Mapping[str, Any]], threads: int) -> float:
+    return min(ns_element(rates, rate["bytes"], threads) for rate in rates)

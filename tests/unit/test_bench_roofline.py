@@ -157,12 +157,14 @@ def test_what_gathers_alone_would_take():
     for name in roofline.STRUCTURES:
         row |= {f"{name}_bytes": 512, f"{name}_places": 0, f"{name}_gathered": 0}
     row |= {"planes_bytes": 4096, "planes_places": 5, "planes_gathered": 30}
+    row |= {"slots_places": 10, "slots_gathered": 10}
     row |= {"lists_bytes": 2**20, "lists_places": 7, "lists_gathered": 7}
     planes = (5 * 2.0 + 25 * 1.0) / 10  # the first number of a plane waits, the others are near
-    assert roofline.gather_ns(RATES, row, "planes", near=False) == pytest.approx(planes)
-    assert roofline.floor_ns(RATES, row) == pytest.approx(planes + 7 * 8.0 / 10)
-    assert roofline.floor_ns(RATES, row, near=True) == pytest.approx(37 / 10)
-    assert roofline.floor_ns(RATES, {**row, "threads": 2}, near=True) == pytest.approx(37 / 20)
+    assert roofline.far_ns(RATES, row, "planes") == pytest.approx(planes)
+    slots = 10 * 1.0 / 10
+    assert roofline.far_gathers_ns(RATES, row) == pytest.approx(planes + 7 * 8.0 / 10 + slots)
+    assert roofline.near_gathers_ns(RATES, row) == pytest.approx(37 / 10)  # but the slots
+    assert roofline.near_gathers_ns(RATES, {**row, "threads": 2}) == pytest.approx(37 / 20)
 
 
 def test_the_budget_is_what_embree_leaves():
@@ -302,7 +304,7 @@ def test_the_report_is_made_of_the_files_alone(tmp_path, record):
     ]  # fmt: skip
     first = cells_of(table, "hall, front")
     assert (first["march / may take"], first["set-up / may take"]) == ("3.00", "0.400")
-    assert table.rows[3][7:10] == ["none"] * 3
+    assert table.rows[3][7:11] == ["none"] * 4
     row = data.results.iloc[0]
     at_once = cells_of(by_title["The march's time"], "hall, front")
     assert at_once["ns a step"] == report.number(300 * row.rays / row.steps)

@@ -16,11 +16,16 @@ from hybrid_rt_bench.report.figures import BLUE, GREEN, GREY, ORANGE, SKY, STYLE
 from hybrid_rt_bench.report.roofline import view
 from hybrid_rt_bench.report.table import number
 from hybrid_rt_bench.results import RunData
-from hybrid_rt_bench.roofline import STRUCTURES, floor_ns
+from hybrid_rt_bench.roofline import STRUCTURES, far_gathers_ns, near_gathers_ns
 
 LINES = (("gather", "-", "o"), ("chain", "--", "s"))
 NAMES = {"gather": "independent", "chain": "each waits for the last"}
-PARTS = (("set-up, one step, write", SKY), ("gathers at the measured rate", BLUE), ("rest", GREY))
+PARTS = (
+    ("set-up, one step, write", GREEN),
+    ("near gathers", BLUE),
+    ("more of far gathers", SKY),
+    ("rest", GREY),
+)
 
 
 def plots(run: RunData, folder: Path) -> list[Path]:
@@ -58,7 +63,7 @@ def gather_rate(run: RunData) -> Figure:
     shown = rates[rates.kind.isin([kind for kind, *_ in LINES])]
     slowest = 1 / float(shown.ns_element.max())
     axes[0].set_ylabel("gathered numbers, 10⁹ a second")
-    axes[0].set_ylim(slowest / 8)  # room for the names of the structures
+    axes[0].set_ylim(slowest / 14)  # room for the names of the structures
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=2)
     caches = ", ".join(f"{c['name']} {_size(c['bytes'] / 1024)}" for c in run.meta["caches"])
@@ -105,8 +110,8 @@ def march_budget(run: RunData) -> Figure:
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3)
     figure.supxlabel(
-        "A bar is the march. Gathers end with it where they alone, at random places, would take "
-        "longer.",
+        "A bar is the march. Far gathers, at random places, are cut off where they alone would "
+        "take longer.",
         fontsize=8, color=GREY, x=0.99, ha="right",
     )  # fmt: skip
     return figure
@@ -117,9 +122,10 @@ def _bars(ax: Axes, run: RunData, rows: pd.DataFrame) -> None:
     at = np.arange(len(rows))
     march = rows.march_ns.to_numpy(np.float64)
     start = np.minimum(rows.start_ns.to_numpy(np.float64), march)
-    gathers = np.array([floor_ns(run.meta["rates"], row) for row in each])
-    gathers = np.minimum(gathers, march - start)
-    heights = start, gathers, march - start - gathers
+    rates = run.meta["rates"]
+    near = np.minimum([near_gathers_ns(rates, row) for row in each], march - start)
+    far = np.minimum([far_gathers_ns(rates, row) for row in each], march - start)
+    heights = start, near, far - near, march - start - far
     bottom = np.zeros(len(rows))
     for (label, colour), height in zip(PARTS, heights, strict=True):
         ax.bar(at, height, 0.62, bottom=bottom, color=colour, label=label, zorder=2)
