@@ -87,6 +87,10 @@ class Pooled:
         milliseconds = float(timed[column].sum())
         return float(timed["rays"].sum()) / milliseconds / 1e3 if milliseconds else float("nan")
 
+    def nanoseconds(self, column: str) -> float:
+        """Return nanoseconds a ray, by a column of milliseconds; NaN if nothing is timed."""
+        return 1e3 / self.per_second(column)
+
     def median(self, column: str) -> float:
         """Return the median over rows; NaN where no row has a value."""
         return float(self.rows[column].median())
@@ -100,25 +104,50 @@ class Pooled:
         return float(self.rows[column].mean())
 
     def speedup(self, samples: pd.DataFrame) -> stats.Estimate | None:
+        """Return `ratio` of the strongest Embree, tracing every ray, to the hybrid."""
+        return self.ratio(samples, "embree", "hybrid")
+
+    def ratio(self, samples: pd.DataFrame, over: str, under: str) -> stats.Estimate | None:
         """Return the geometric mean over rows of the medians of the rounds' paired ratios.
 
         Parameters
         ----------
         samples : DataFrame
             All samples of the run, with `CELL` and `POINT`; those of `rows` are taken.
+        over, under : str
+            Columns of seconds.
 
         Returns
         -------
         Estimate or None
             With a 95 % bootstrap interval over rounds; None where nothing is timed.
         """
-        if samples.empty:
-            return None
-        keys = [*CELL, *POINT]
-        mine = samples.merge(self.rows[keys], on=keys)
-        ratios = (mine["embree"] / mine["hybrid"]).groupby([mine[key] for key in keys], sort=False)
-        groups = [group.to_numpy() for _, group in ratios]
+        groups = [(mine[over] / mine[under]).to_numpy() for mine in self._samples_by_row(samples)]
         return stats.geometric_mean_of_medians(groups) if groups else None
+
+    def may_cost(self, samples: pd.DataFrame) -> float:
+        """Return what the march may cost, ns a ray, for the hybrid to break even.
+
+        The time of Embree tracing every ray, less that of the hybrid without its march, each beside
+        the other: the median over rounds, added up over rows. Below 0, no march is fast enough; NaN
+        where nothing is timed.
+
+        Parameters
+        ----------
+        samples : DataFrame
+            As in `ratio`.
+        """
+        rows = self._samples_by_row(samples)
+        spare = [(mine["embree"] - (mine["hybrid"] - mine["march"])).median() for mine in rows]
+        rays = sum(int(mine["rays"].iloc[0]) for mine in rows)
+        return 1e9 * float(np.sum(spare)) / rays if rays else float("nan")
+
+    def _samples_by_row(self, samples: pd.DataFrame) -> list[pd.DataFrame]:
+        if samples.empty:
+            return []
+        keys = [*CELL, *POINT]
+        mine = samples.merge(self.rows[[*keys, "rays"]], on=keys)
+        return [group for _, group in mine.groupby(keys, sort=False)]
 
 
 def pools(rows: pd.DataFrame, by: Sequence[str]) -> dict[tuple[str, ...], Pooled]:

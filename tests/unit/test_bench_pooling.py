@@ -41,7 +41,9 @@ def frame():
 def samples():
     def timed(camera, technique, embree, hybrid):
         rows = zip(embree, hybrid, strict=True)
-        return [{**row(camera, technique), "embree": e, "hybrid": h} for e, h in rows]
+        return [
+            {**row(camera, technique), "embree": e, "hybrid": h, "march": 0.75 * h} for e, h in rows
+        ]
 
     return pd.DataFrame(
         timed("a", "x", (2.0, 4.0, 6.0), (1.0, 1.0, 1.0))  # median ratio 4
@@ -85,6 +87,31 @@ def test_speedup_is_the_geometric_mean_of_the_cells_paired_medians():
     assert x.low <= x.value <= x.high
     assert y.value == pytest.approx(3)
     assert pooled[("x",)].speedup(pd.DataFrame()) is None
+
+
+def test_ratios_are_of_any_two_stages():
+    x = pools(frame(), ["technique"])[("x",)]
+    ratio = x.ratio(samples(), "march", "hybrid")
+    assert (ratio.low, ratio.value, ratio.high) == pytest.approx((0.75, 0.75, 0.75))
+    assert x.ratio(samples(), "hybrid", "embree").value == pytest.approx(1 / np.sqrt(4 * 1))
+
+
+def test_the_march_may_cost_what_the_rest_of_the_hybrid_leaves_of_embrees_time():
+    pooled = pools(frame(), ["technique"])
+    # Camera a: median of 2, 4, 6 less a quarter of 1; camera b: of 1, 2, 9 less a quarter of each.
+    spare = (4 - 0.25) + (2 - 0.5)
+    assert pooled[("x",)].may_cost(samples()) == pytest.approx(1e9 * spare / 400)
+    only_a = samples()[lambda s: s["camera"] == "a"]  # what is not timed has no part in it
+    assert pooled[("x",)].may_cost(only_a) == pytest.approx(1e9 * 3.75 / 100)
+    assert np.isnan(pooled[("x",)].may_cost(pd.DataFrame()))
+    slow = samples().assign(hybrid=100.0, march=1.0)
+    assert pooled[("x",)].may_cost(slow) < 0
+
+
+def test_nanoseconds_a_ray_are_of_the_timed_rows():
+    x = pools(frame(), ["technique"])[("x",)]
+    assert x.nanoseconds("march_ms") == pytest.approx(1e6 / 100)
+    assert np.isnan(pools(frame(), ["technique"])[("y",)].nanoseconds("march_ms"))
 
 
 def test_pools_keep_the_order_of_first_appearance():
