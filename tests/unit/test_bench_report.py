@@ -260,6 +260,13 @@ def test_markdown_table_has_as_many_cells_in_every_row():
     assert len({line.replace("\\|", "").count("|") for line in lines}) == 1
 
 
+def test_a_heading_is_broken_where_its_column_is_narrower():
+    table = Table("T", ["", "speed-up, measured", "a"], [["heading"], ["name", "1 [1, 1]", "2"]])
+    headings = [str(column.header) for column in table.rich().columns]
+    assert headings == ["", "speed-up,\nmeasured", "a"]
+    assert table.markdown().count("speed-up, measured") == 1
+
+
 def test_stats_of_a_report_do_not_depend_on_order():
     groups = [[1.0, 2.0, 3.0], [3.0, 2.0, 1.0]]
     assert stats.geometric_mean_of_medians(groups).value == pytest.approx(2.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from dataclasses import dataclass, field
 
 from rich.table import Table as RichTable
@@ -55,7 +56,12 @@ class Table:
             header_style="bold",
         )
         for number, column in enumerate(self.columns):
-            table.add_column(column, justify="right" if number else "left")
+            # A heading is broken where the column below it is narrower.
+            widest = max(
+                (len(row[number]) for row in self.rows if len(row) > number > 0), default=0
+            )
+            lines = textwrap.wrap(column, max(widest, *map(len, column.split() or [""]), 1))
+            table.add_column("\n".join(lines), justify="right" if number else "left")
         for row in self.rows:
             style = "bold" if len(row) == 1 else "italic" if paper(row) else ""
             table.add_row(*(Text(cell, style=style) for cell in row))
