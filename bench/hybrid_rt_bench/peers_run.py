@@ -88,7 +88,7 @@ class _Run:
             self._measure_scene(planned)
 
     def _measure_scene(self, planned: PlannedScene) -> None:
-        name, views = planned.spec.name, len(planned.cameras) * len(self.experiment.resolutions)
+        name, views = planned.name, len(planned.cameras) * len(self.experiment.resolutions)
         self.reporter.doing(f"loading {name}")
         try:
             scene = planned.spec.load(size=planned.size)

@@ -34,6 +34,14 @@ class PlannedScene:
     cameras: tuple[str, ...]
     size: int | None
 
+    @property
+    def name(self) -> str:
+        """What results call it: the scene's name, and its size where one was asked for."""
+        if self.size is None:
+            return self.spec.name
+        power = self.size.bit_length() - 1
+        return f"{self.spec.name} {f'2^{power}' if self.size == 2**power else self.size}"
+
 
 @dataclass
 class Plan:
@@ -88,7 +96,11 @@ def make_plan(
             continue
         if spec is not None:
             names = _camera_names(entry, spec, experiment, cameras)
-            plan.scenes.append(PlannedScene(spec, entry.row, names, entry.size))
+            planned = PlannedScene(spec, entry.row, names, entry.size)
+            if planned.name in [scene.name for scene in plan.scenes]:  # it stands in for two
+                plan.notes.append(f"scene {planned.name!r} is measured only once")
+            else:
+                plan.scenes.append(planned)
     if cameras is not None:
         _check_cameras(plan, cameras)
     if not plan.scenes and not plan.unreadable:
@@ -106,11 +118,11 @@ def find_scene(name: str) -> hrs.SceneSpec:
 def _entries(experiment: SceneExperiment, scenes: Sequence[str] | None) -> list[SceneEntry]:
     if scenes is None:
         return experiment.scenes
-    known = {entry.name: entry for entry in experiment.scenes}
-    return [
-        known.get(name, SceneEntry(name=name, row=experiment.row_of(name)))
-        for name in dict.fromkeys(scenes)
-    ]
+    found = []
+    for name in dict.fromkeys(scenes):
+        known = [entry for entry in experiment.scenes if entry.name == name]
+        found += known or [SceneEntry(name=name, row=experiment.row_of(name))]
+    return found
 
 
 def _available(entry: SceneEntry, plan: Plan, *, allow_stand_in: bool) -> hrs.SceneSpec | None:

@@ -177,11 +177,11 @@ def _measure_all(
     for path, reason in plan.unreadable:
         fail(writer, reporter, Path(path).stem, "", None, reason)
     for planned in plan.scenes:
-        reporter.doing(f"loading {planned.spec.name}")
+        reporter.doing(f"loading {planned.name}")
         try:
             loaded = load_planned(planned, threads, writer)
         except (hrt.HybridRTError, MemoryError) as error:
-            fail(writer, reporter, planned.spec.name, "", None, reason_of(error))
+            fail(writer, reporter, planned.name, "", None, reason_of(error))
             reporter.advance(len(planned.cameras) * len(experiment.resolutions) * a_cell)
             continue
         for camera in planned.cameras:
@@ -203,7 +203,7 @@ def _measure_one(
     writer: RunWriter,
     reporter: Reporter,
 ) -> None:
-    name = f"{planned.spec.name}, {camera}, {resolution}"
+    name = f"{planned.name}, {camera}, {resolution}"
     reporter.doing(name)
     done = 0
 
@@ -226,10 +226,10 @@ def _measure_one(
         raise
     except Exception as error:  # one bad cell must not cost the others
         reporter.advance(experiment.warmup + experiment.rounds - done)
-        fail(writer, reporter, planned.spec.name, camera, resolution, reason_of(error))
+        fail(writer, reporter, planned.name, camera, resolution, reason_of(error))
         return
     writer.add_cell(
-        {**_keys(planned.spec.name, camera, resolution), **record.details},
+        {**_keys(planned.name, camera, resolution), **record.details},
         record.samples,
         record.results,
         record.verdicts,
@@ -249,7 +249,7 @@ def load_planned(planned: PlannedScene, threads: int, writer: RunWriter) -> meas
     loaded = measure.prepare(scene, threads)
     writer.meta["scenes"].append(
         {
-            "name": planned.spec.name,
+            "name": planned.name,
             "title": planned.spec.title,
             "row": planned.row,
             "builtin": planned.spec.builtin,

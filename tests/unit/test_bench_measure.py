@@ -156,6 +156,26 @@ def test_cameras_are_taken_by_the_scenes_that_have_them():
         plan.make_plan(PAPER, scenes=["sphere"], cameras=["clos"])
 
 
+def test_sizes_of_one_scene_are_told_apart():
+    street = [{"name": "street", "size": size} for size in (2**10, 5000)]
+    experiment = PAPER.model_validate(
+        {**PAPER.model_dump(by_alias=True), "scenes": [*street, {"name": "sphere"}]}
+    )
+    for scenes, wanted in ((None, 3), (["street"], 2)):
+        found = plan.make_plan(experiment, scenes=scenes).scenes
+        assert [scene.name for scene in found] == ["street 2^10", "street 5000", "sphere"][:wanted]
+        assert [scene.size for scene in found] == [2**10, 5000, None][:wanted]
+
+
+def test_a_scene_that_stands_in_for_two_is_measured_once(monkeypatch, tmp_path):
+    monkeypatch.setenv("HYBRID_RT_DATA", str(tmp_path))
+    both = [{"name": name, "stand_in": "sphere"} for name in ("nori_sphere", "conference")]
+    experiment = PAPER.model_validate({**PAPER.model_dump(by_alias=True), "scenes": both})
+    found = plan.make_plan(experiment)
+    assert [scene.name for scene in found.scenes] == ["sphere"]
+    assert "'sphere' is measured only once" in found.notes[-1]
+
+
 def test_problems_name_what_would_spoil_timings():
     quiet = {
         "load_average": 0.0, "logical_cores": 8, "threading_layer": "omp", "threads": 8,
