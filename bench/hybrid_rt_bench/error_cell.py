@@ -31,6 +31,9 @@ EMBREE = "embree"
 T_ERRORS = ("error_t_p50", "error_t_p99", "error_t_max")
 """Columns for the error of t of claimed hits."""
 
+PREPARED = ("prepare_ms", "prepare_mib", "lists_mib", "tests")
+"""Columns for what a march needs that Embree does not."""
+
 Columns = dict[str, Any]
 
 
@@ -49,6 +52,8 @@ class Cell:
         Whether to keep error maps and the error of the image.
     selection_rays : int
         See `hybrid_rt_bench.strongest.choose`.
+    rivals : bool
+        Whether Embree's two modes have rows of their own in a timed cell.
     """
 
     query: Query
@@ -57,6 +62,7 @@ class Cell:
     rounds: int
     picture: bool
     selection_rays: int
+    rivals: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,10 +96,11 @@ def measure_cell(
         )
         rivals = {
             mode: _best_of(loaded.candidates, choice.nanoseconds, mode)
-            for mode in ("default", "robust")
+            for mode in (("default", "robust") if cell.rivals else ())
         }
-        judged.add_embree("default", cell.query.trace(rivals["default"].tracer, cell.rays))
-        judged.add_reference()
+        if cell.rivals:
+            judged.add_embree("default", cell.query.trace(rivals["default"].tracer, cell.rays))
+            judged.add_reference()
         samples = _time(cell, view, choice.best.tracer, rivals, on_pass)
         details |= {
             "embree_path": choice.best.label,
@@ -133,6 +140,7 @@ class _Judged:
             **_count_columns(judged, marched.resolved),
             "steps": float(marched.steps.sum(dtype=np.int64)),
             "prepare_ms": 1e3 * screen.seconds,
+            "prepare_mib": screen.nbytes / 2**20,
             "lists_mib": 0.0 if screen.lists is None else screen.lists.nbytes / 2**20,
             "tests": float(marched.tests),
         }
@@ -173,7 +181,7 @@ class _Judged:
         self.results.append(self._embree_row("robust", {**row, **_wrong_columns(row)}))
 
     def _embree_row(self, mode: str, row: Columns) -> Columns:
-        nothing = {"steps": np.nan, "prepare_ms": 0.0, "lists_mib": 0.0, "tests": 0.0}
+        nothing = {"steps": np.nan} | dict.fromkeys(PREPARED, 0.0)
         return {**_names(EMBREE, mode, mode == "robust"), **row, **nothing}
 
     def _note(self, judged: hrt.Judged) -> None:

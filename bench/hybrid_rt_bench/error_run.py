@@ -14,7 +14,7 @@ from hybrid_rt_bench import env, error_cell
 from hybrid_rt_bench.error_spec import ErrorExperiment, WorkloadEntry
 from hybrid_rt_bench.measure import CellError, LoadedScene, prepare
 from hybrid_rt_bench.plan import Plan, PlannedScene, make_plan
-from hybrid_rt_bench.points import Point, View, points_of
+from hybrid_rt_bench.points import Point, View, Which, points_of
 from hybrid_rt_bench.pooling import CELL
 from hybrid_rt_bench.progress import Reporter
 from hybrid_rt_bench.queries import query_of
@@ -44,17 +44,20 @@ class PlannedCell:
     seed : int
     timed : bool
     points : tuple of Point
+    rivals : bool
+        Whether Embree's two modes are measured as well.
     """
 
     entry: WorkloadEntry
     seed: int
     timed: bool
     points: tuple[Point, ...]
+    rivals: bool = False
 
     def passes(self, rounds: int) -> int:
         """Return how often the rays go through a point: once to be judged, then once a round."""
         judged = len(self.points)
-        return judged + (rounds * (judged + 2) if self.timed else 0)
+        return judged + (rounds * (judged + 2 * self.rivals) if self.timed else 0)
 
 
 def run_error(
@@ -118,12 +121,13 @@ def plan_cells(
                 and resolution in experiment.timed
                 and (entry.cameras is None or camera < entry.cameras)
             )
-            every = timed and entry.points == "all"
-            names = experiment.techniques if timed else experiment.counted
-            found = [points_of(techniques[name], scene, every=every) for name in names]
+            complete = timed and (experiment.complete is None or resolution in experiment.complete)
+            which: Which = entry.points if timed else "default"
+            names = experiment.techniques if complete else experiment.counted
+            found = [points_of(techniques[name], scene, which) for name in names]
             if found:
                 points = tuple(point for some in found for point in some)
-                cells.append(PlannedCell(entry, seed, timed, points))
+                cells.append(PlannedCell(entry, seed, timed, points, complete))
     return cells
 
 
@@ -152,17 +156,20 @@ class _Run:
         self.total = sum(work.values())
         self.reporter.total(self.total, "Mrays, all points")
         for planned in self.plan.scenes:
-            name = planned.spec.name
-            self.reporter.doing(f"loading {name}")
-            try:
-                loaded = load_planned(planned, self.threads, self.writer)
-            except (hrt.HybridRTError, MemoryError) as error:
-                self._fail(name, "", None, reason_of(error))
-                self._advance(work[id(planned)])
-                continue
-            for number, camera in enumerate(planned.cameras):
-                for resolution in self.experiment.resolutions:
-                    self._measure_view(planned, loaded, number, camera, resolution)
+            self._measure_scene(planned, work[id(planned)])
+
+    def _measure_scene(self, planned: PlannedScene, work: float) -> None:
+        # The scene ends with this call: two of them together may be more than there is memory for.
+        self.reporter.doing(f"loading {planned.name}")
+        try:
+            loaded = load_planned(planned, self.threads, self.writer)
+        except (hrt.HybridRTError, MemoryError) as error:
+            self._fail(planned.name, "", None, reason_of(error))
+            self._advance(work)
+            return
+        for number, camera in enumerate(planned.cameras):
+            for resolution in self.experiment.resolutions:
+                self._measure_view(planned, loaded, number, camera, resolution)
 
     def _measure_view(
         self,
@@ -172,21 +179,20 @@ class _Run:
         camera: str,
         resolution: Resolution,
     ) -> None:
-        name = planned.spec.name
         cells = plan_cells(self.experiment, self.techniques, loaded.scene, resolution, number)
         try:
             seen = planned.spec.camera(camera, resolution.width, resolution.height)
             view = View(loaded.scene, seen, self.threads)
         except Exception as error:
-            self._fail(name, camera, resolution, reason_of(error))
+            self._fail(planned.name, camera, resolution, reason_of(error))
             self._advance(sum(self._cell_work(cell, resolution) for cell in cells))
             return
         for cell in cells:
-            self._measure_cell(planned.spec, loaded, view, camera, resolution, cell)
+            self._measure_cell(planned, loaded, view, camera, resolution, cell)
 
     def _measure_cell(
         self,
-        spec: hrs.SceneSpec,
+        planned: PlannedScene,
         loaded: LoadedScene,
         view: View,
         camera: str,
@@ -194,12 +200,12 @@ class _Run:
         cell: PlannedCell,
     ) -> None:
         workload = get_workload(cell.entry.name)
-        name = f"{spec.name}, {camera}, {resolution}, {workload.name}"
+        name = f"{planned.name}, {camera}, {resolution}, {workload.name}"
         self.reporter.doing(name)
         before, whole = self.done, self._cell_work(cell, resolution)
         keys = {"workload": workload.name, "seed": cell.seed}
         try:
-            rays = workload.make(spec, view.gbuffer, cell.seed)
+            rays = workload.make(planned.spec, view.gbuffer, cell.seed)
             if len(rays) == 0:
                 raise CellError(f"{name}: no rays, since the camera sees no surface")
             record = error_cell.measure_cell(
@@ -214,18 +220,19 @@ class _Run:
                     and workload.name == PICTURED
                     and resolution == self.experiment.picture,
                     self.experiment.selection_rays,
+                    cell.rivals,
                 ),
                 lambda: self._advance(whole / cell.passes(self.experiment.rounds)),
             )
         except ReportsError:
             raise
         except Exception as error:  # one bad cell must not cost the others
-            self._fail(spec.name, camera, resolution, reason_of(error), **keys)
+            self._fail(planned.name, camera, resolution, reason_of(error), **keys)
             self._advance(whole - (self.done - before))
             return
         self.writer.add_cell(
             {
-                "scene": spec.name,
+                "scene": planned.name,
                 "camera": camera,
                 "width": resolution.width,
                 "height": resolution.height,
@@ -303,7 +310,7 @@ def _compile(
             points = [
                 point
                 for technique in techniques.values()
-                for point in points_of(technique, loaded.scene, every=entry.points == "all")
+                for point in points_of(technique, loaded.scene, entry.points)
             ]
             error_cell.measure_cell(
                 loaded,

@@ -17,8 +17,8 @@ class WorkloadEntry(BaseModel):
     ----------
     name : str
         Registered in `hybrid_rt_bench.workloads`.
-    points : {"all", "default"}
-        Which parameters of each technique are measured.
+    points : {"all", "default", "switches", "cheapest"}
+        Which parameters of each technique are measured; see `hybrid_rt_bench.points.points_of`.
     cameras : int, optional
         Time only the first so many cameras of each scene; the others are counted. Default: all.
     seeds : int
@@ -28,7 +28,7 @@ class WorkloadEntry(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str = Field(min_length=1)
-    points: Literal["all", "default"] = "default"
+    points: Literal["all", "default", "switches", "cheapest"] = "default"
     cameras: int | None = Field(default=None, ge=0)
     seeds: int = Field(default=1, ge=1)
 
@@ -44,12 +44,16 @@ class ErrorExperiment(SceneExperiment):
     techniques : list of str
         Names registered in `hybrid_rt_bench.techniques`.
     counted : list of str
-        Those that are judged, with their default parameters, in the cells that are not timed.
+        Those that are judged, with their default parameters, in the cells that are not timed; and
+        the only ones in timed cells that are not `complete`.
     workloads : list of WorkloadEntry
     resolutions : list of Resolution
     timed : list of Resolution
         At which cells are timed.
-    picture : Resolution
+    complete : list of Resolution, optional
+        At which timed cells all techniques are measured, and Embree's two modes beside them; some
+        of `timed`. Default: all of them.
+    picture : Resolution, optional
         At which mirror cells keep error maps and the error of the image; one of `timed`.
     rounds : int
         Timed rounds of a point; the round in which it is judged is their warm-up.
@@ -65,15 +69,16 @@ class ErrorExperiment(SceneExperiment):
     workloads: list[WorkloadEntry] = Field(min_length=1)
     resolutions: list[ResolutionText] = Field(min_length=1)
     timed: list[ResolutionText] = Field(min_length=1)
-    picture: ResolutionText
+    complete: list[ResolutionText] | None = None
+    picture: ResolutionText | None = None
     rounds: int = Field(ge=1)
     selection_rays: int = Field(default=131072, ge=1024)
 
-    @field_validator("counted", "timed", "picture")
+    @field_validator("counted", "timed", "complete", "picture")
     @classmethod
     def _is_known(cls, value: Any, info: ValidationInfo) -> Any:
         name = str(info.field_name)
-        of = {"counted": "techniques", "timed": "resolutions", "picture": "timed"}[name]
+        of = {"counted": "techniques", "timed": "resolutions"}.get(name, "timed")
         known = info.data.get(of, [])
         for item in value if isinstance(value, list) else [value]:
             if known and item not in known:
@@ -88,5 +93,9 @@ class ErrorExperiment(SceneExperiment):
             return changed
         order = sorted(resolutions, key=lambda r: r.width * r.height)
         timed = [r for r in order if r in self.timed] or order[:1]
-        picture = self.picture if self.picture in timed else timed[-1]
-        return changed.model_copy(update={"timed": timed, "picture": picture})
+        changes: dict[str, Any] = {"timed": timed}
+        if self.picture is not None:
+            changes["picture"] = self.picture if self.picture in timed else timed[-1]
+        if self.complete is not None:
+            changes["complete"] = [r for r in timed if r in self.complete] or timed
+        return changed.model_copy(update=changes)

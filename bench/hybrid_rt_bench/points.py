@@ -4,16 +4,85 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
+
+import numpy as np
 
 import hybrid_rt as hrt
 from hybrid_rt.certified import LENGTH
+from hybrid_rt.lists import primitive_lists
 from hybrid_rt_bench.techniques import Technique
 
-LISTS = (2, 4, LENGTH, 16)
+Which = Literal["all", "default", "switches", "cheapest"]
+"""Which points of a technique are measured; see `points_of`."""
+
+
+@dataclass(frozen=True)
+class ListsForm:
+    """Lists of primitives as "certified" reads them.
+
+    Attributes
+    ----------
+    length : int
+        Primitives a list, at most.
+    cell : int
+        Pixels of the image along each side of the square that has a list.
+    guard : float
+        Width and height of what has lists, in those of the screen.
+    planes : bool
+        Whether the planes of the primitives may put off an exact test.
+    """
+
+    length: int = LENGTH
+    cell: int = 1
+    guard: float = 1.0
+    planes: bool = True
+
+    def camera(self, camera: hrt.Camera) -> hrt.Camera:
+        """Return the view in whose pixels the lists for a screen are made."""
+        wide = camera if self.guard == 1.0 else camera.widened(self.guard)
+        return wide.resized(max(1, wide.width // self.cell), max(1, wide.height // self.cell))
+
+
+LISTS = tuple(dict.fromkeys((2, 4, 8, LENGTH, 16)))
 """Lengths of the lists of primitives a pixel with which "certified" is measured."""
+
+Changes = dict[str, Any]
+
+CHEAPEST: tuple[str, Changes, Changes] = (
+    "4x4 cells, guard x2, 4 tests, 32 steps, probe 1 of 16",
+    {"max_tests": 4, "max_steps": 32, "probes": 1},
+    {"cell": 4, "guard": 2.0},
+)
+"""A march that gives up early: its label, and what it changes of `Certified` and `ListsForm`."""
+
+SWITCHES: tuple[tuple[str, Changes, Changes], ...] = (
+    ("base", {}, {}),
+    ("one ray at a time", {"vectors": False, "probes": 16}, {}),
+    ("no planes", {}, {"planes": False}),
+    *((f"lists {n}", {}, {"length": n}) for n in LISTS),
+    *((f"{n}x{n} cells", {}, {"cell": n}) for n in (1, 2, 4, 8)),
+    *((f"guard x{g:g}", {}, {"guard": g}) for g in (1.5, 2.0)),
+    *((f"4x4 cells, guard x{g:g}", {}, {"cell": 4, "guard": g}) for g in (1.5, 2.0)),
+    *((f"{n} tests", {"max_tests": n}, {}) for n in (4, 8, 16, 64)),
+    *((f"{n} steps", {"max_steps": n}, {}) for n in (16, 32, 64)),
+    ("any number of steps", {"max_steps": None}, {}),
+    ("no hand-over", {"hand_over": False}, {}),
+    *((f"probe {n} of 16", {"probes": n}, {}) for n in (1, 2, 4, 8, 16)),
+    ("4x4 cells, 4 tests, 32 steps", {"max_tests": 4, "max_steps": 32}, {"cell": 4}),
+    (
+        "lists 2, 4 tests, 32 steps, probe 1 of 16",
+        {"max_tests": 4, "max_steps": 32, "probes": 1},
+        {"length": 2},
+    ),
+    CHEAPEST,
+)
+"""What "certified" can do without, or otherwise; each as `CHEAPEST`, the first is the default.
+
+One that asks for what is the default anyway is no point of its own.
+"""
 
 
 @dataclass(frozen=True)
@@ -28,15 +97,15 @@ class Point:
     mode : Mode
     default : bool
         Whether these are the technique's default parameters.
-    lists : int
-        Length of the lists of primitives that the G-buffer has to hold; 0 for none.
+    lists : ListsForm, optional
+        The lists of primitives that the G-buffer has to hold.
     """
 
     technique: str
     label: str
     mode: hrt.Mode
     default: bool
-    lists: int = 0
+    lists: ListsForm | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +129,11 @@ class Screen:
         """The lists of primitives, if the G-buffer has any."""
         return self.gbuffer.lists
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of what was made: the pyramid, and lists if any."""
+        return int(self.pyramid.data.nbytes) + (0 if self.lists is None else self.lists.nbytes)
+
 
 class View:
     """What one view has on its screen, each form of it made once, when first asked for.
@@ -73,34 +147,42 @@ class View:
 
     def __init__(self, scene: hrt.Scene, camera: hrt.Camera, threads: int) -> None:
         self.scene, self.camera, self.threads = scene, camera, threads
-        self.gbuffer, self.raster_seconds = _timed(
-            lambda: hrt.rasterize(scene, camera, threads=threads)
-        )
-        self._screens: dict[tuple[type | None, int], Screen] = {}
+        self.gbuffer = hrt.rasterize(scene, camera, threads=threads)
+        self._screens: dict[tuple[type | None, ListsForm | None], Screen] = {}
 
     def screen(self, point: Point) -> Screen:
         """Return what the march of a point reads."""
-        kind = type(point.mode) if point.lists or isinstance(point.mode, hrt.SlopeAware) else None
-        if (kind, point.lists) not in self._screens:
-            self._screens[kind, point.lists] = self._make(point)
-        return self._screens[kind, point.lists]
-
-    def _make(self, point: Point) -> Screen:
-        threads = self.threads
-        if isinstance(point.mode, hrt.Certified):
-            start = time.perf_counter()
-            gbuffer = hrt.rasterize(self.scene, self.camera, lists=point.lists, threads=threads)
-            pyramid = hrt.build_depth_pyramid(gbuffer, conservative=True, threads=threads)
-            # What a renderer has anyway, the visible surface, is not a cost of the technique.
-            seconds = time.perf_counter() - start - self.raster_seconds
-            return Screen(gbuffer, pyramid, seconds)
         slope = isinstance(point.mode, hrt.SlopeAware)
-        make = hrt.build_slope_pyramid if slope else hrt.build_depth_pyramid
-        built, seconds = _timed(lambda: make(self.gbuffer, threads=threads))
-        return Screen(self.gbuffer, built, seconds)
+        key = hrt.SlopeAware if slope else None, point.lists
+        if key not in self._screens:
+            if point.lists is not None:
+                self._screens[key] = self._with_lists(point, point.lists)
+            else:
+                make = hrt.build_slope_pyramid if slope else hrt.build_depth_pyramid
+                built, seconds = _timed(lambda: make(self.gbuffer, threads=self.threads))
+                self._screens[key] = Screen(self.gbuffer, built, seconds)
+        return self._screens[key]
+
+    def _with_lists(self, point: Point, form: ListsForm) -> Screen:
+        if not form.planes:
+            whole = dataclasses.replace(form, planes=True)
+            screen = self.screen(dataclasses.replace(point, lists=whole))
+            assert screen.lists is not None
+            # Every comparison denies NaN, so that no plane ever puts a primitive out of question.
+            none = np.full_like(screen.lists.planes, np.nan)
+            lists = dataclasses.replace(screen.lists, planes=none)
+            return dataclasses.replace(screen, gbuffer=self._holding(lists))
+        start = time.perf_counter()
+        camera = form.camera(self.camera)
+        gbuffer = self._holding(primitive_lists(self.scene, camera, form.length, self.threads))
+        pyramid = hrt.build_depth_pyramid(gbuffer, conservative=True, threads=self.threads)
+        return Screen(gbuffer, pyramid, time.perf_counter() - start)
+
+    def _holding(self, lists: hrt.PrimitiveLists) -> hrt.GBuffer:
+        return dataclasses.replace(self.gbuffer, lists=lists)
 
 
-def points_of(technique: Technique, scene: hrt.Scene, *, every: bool) -> list[Point]:
+def points_of(technique: Technique, scene: hrt.Scene, which: Which) -> list[Point]:
     """Return the points of a technique, the one of its default parameters among them.
 
     Parameters
@@ -108,23 +190,36 @@ def points_of(technique: Technique, scene: hrt.Scene, *, every: bool) -> list[Po
     technique : Technique
     scene : Scene
         What lengths in world units relate to.
-    every : bool
-        All of them; else the default alone.
+    which : {"all", "default", "switches", "cheapest"}
+        The whole grid, or the default alone. Of "certified" also every one of `SWITCHES`, or the
+        default and `CHEAPEST`; of all others these two are the default alone.
     """
+    if isinstance(technique.mode, hrt.Certified):
+        return _certified(technique.name, technique.mode, which)
     usual = _in_scene(technique.mode, scene)
     points = [
         Point(technique.name, label, mode, default=_in_scene(mode, scene) == usual)
         for label, mode in technique.points(scene)
     ]
-    if isinstance(technique.mode, hrt.Certified):
-        points = [
-            dataclasses.replace(point, label=f"lists {lists}", default=lists == LENGTH, lists=lists)
-            for point in points
-            for lists in LISTS
-        ]
     if not any(point.default for point in points):
         points.insert(0, Point(technique.name, "default", technique.mode, default=True))
-    return points if every else [point for point in points if point.default]
+    return points if which == "all" else [point for point in points if point.default]
+
+
+def _certified(name: str, usual: hrt.Certified, which: Which) -> list[Point]:
+    """Return the points of mode "certified", none twice, the default first but in its grid."""
+    asked: dict[Which, Sequence[tuple[str, Changes, Changes]]] = {
+        "all": [(f"lists {n}", {}, {"length": n}) for n in LISTS],
+        "default": [(f"lists {LENGTH}", {}, {})],
+        "switches": SWITCHES,
+        "cheapest": [SWITCHES[0], CHEAPEST],
+    }
+    points: dict[tuple[hrt.Mode, ListsForm], Point] = {}
+    for label, of_march, of_lists in asked[which]:
+        mode, form = dataclasses.replace(usual, **of_march), ListsForm(**of_lists)
+        default = (mode, form) == (usual, ListsForm())
+        points.setdefault((mode, form), Point(name, label, mode, default, form))
+    return list(points.values())
 
 
 def _in_scene(mode: hrt.Mode, scene: hrt.Scene) -> hrt.Mode:

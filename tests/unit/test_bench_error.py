@@ -8,7 +8,7 @@ from hybrid_rt_bench import error_cell, image_error, shade
 from hybrid_rt_bench.error_run import plan_cells
 from hybrid_rt_bench.error_spec import ErrorExperiment
 from hybrid_rt_bench.measure import prepare
-from hybrid_rt_bench.points import View, points_of
+from hybrid_rt_bench.points import CHEAPEST, LISTS, SWITCHES, ListsForm, View, points_of
 from hybrid_rt_bench.pooling import VERDICTS
 from hybrid_rt_bench.queries import AnyHit, NearestHit
 from hybrid_rt_bench.spec import Resolution, load_experiment, parse_experiment
@@ -52,7 +52,7 @@ def measured(cornell):
     points = [
         point
         for technique in TECHNIQUES.values()
-        for point in points_of(technique, loaded.scene, every=False)
+        for point in points_of(technique, loaded.scene, "default")
     ]
     found = {}
     for name, query in (("mirror", NearestHit()), ("shadow_point", AnyHit())):
@@ -78,6 +78,8 @@ def test_the_experiment_of_the_package_asks_for_what_is_there(quick):
         ('timed = ["64x48"]', 'timed = ["65x48"]', r"timed: expected one of resolutions"),
         ('picture = "64x48"', 'picture = "128x96"', r"picture: expected one of timed .*64x48"),
         ("seeds = 2", "seeds = 0", r"workloads.1.seeds"),
+        ("rounds = 2", 'rounds = 2\ncomplete = ["128x96"]', r"complete: expected one of timed"),
+        ('points = "all"', 'points = "switch"', r"workloads.0.points: .*'switches'.*'switch'"),
     ],
 )
 def test_settings_that_do_not_fit_are_refused(old, new, said):
@@ -117,11 +119,123 @@ def test_cells_are_timed_or_counted_as_the_settings_say(cornell):
 
 @pytest.mark.parametrize("name", TECHNIQUES)
 def test_every_technique_has_one_default_point_and_labels_that_differ(name, cornell):
-    points = points_of(TECHNIQUES[name], cornell.load(), every=True)
+    points = points_of(TECHNIQUES[name], cornell.load(), "all")
     assert sum(point.default for point in points) == 1
     assert len({point.label for point in points}) == len(points)
-    (usual,) = points_of(TECHNIQUES[name], cornell.load(), every=False)
+    (usual,) = points_of(TECHNIQUES[name], cornell.load(), "default")
     assert usual in points
+
+
+def test_every_switch_is_one_change_of_the_default_and_none_is_measured_twice(cornell):
+    points = points_of(TECHNIQUES["certified"], cornell.load(), "switches")
+    base, *others = points
+    assert (base.label, base.default, base.lists) == ("base", True, ListsForm())
+    assert base.mode == TECHNIQUES["certified"].mode
+    assert not any(point.default for point in others)
+    assert len({point.label for point in points}) == len(points)
+    assert len({(point.mode, point.lists) for point in points}) == len(points)
+    # Left out is only what the default is already.
+    left = {label for label, *_ in SWITCHES} - {point.label for point in points}
+    assert len(left) <= 5
+    assert f"lists {base.lists.length}" in left
+    by_label = {point.label: point for point in points}
+    assert by_label["no planes"].lists == ListsForm(planes=False)
+    assert by_label["no planes"].mode == base.mode
+    assert by_label["one ray at a time"].mode.vectors is False
+    assert by_label["4x4 cells, guard x2"].lists == ListsForm(cell=4, guard=2.0)
+    cheap = by_label[CHEAPEST[0]]
+    assert (cheap.mode.max_tests, cheap.mode.max_steps, cheap.mode.probes) == (4, 32, 1)
+
+
+def test_the_usual_runs_have_a_small_grid_of_certified(cornell):
+    scene = cornell.load()
+    assert len(points_of(TECHNIQUES["certified"], scene, "all")) == len(LISTS) <= 5
+    assert [p.label for p in points_of(TECHNIQUES["certified"], scene, "cheapest")] == [
+        "base", CHEAPEST[0],
+    ]  # fmt: skip
+    for name in ("paper", "slope", "hiz", "linear", "dda"):
+        usual = points_of(TECHNIQUES[name], scene, "default")
+        assert points_of(TECHNIQUES[name], scene, "switches") == usual
+        assert points_of(TECHNIQUES[name], scene, "cheapest") == usual
+
+
+def test_lists_have_the_size_that_their_form_says(cornell):
+    camera = cornell.camera(next(iter(cornell.cameras)), 64, 48)
+    assert ListsForm().camera(camera) == camera
+    sizes = {
+        ListsForm(cell=4): (16, 12), ListsForm(guard=1.5): (96, 72),
+        ListsForm(cell=4, guard=2.0): (32, 24), ListsForm(cell=100): (1, 1),
+    }  # fmt: skip
+    for form, size in sizes.items():
+        seen = form.camera(camera)
+        assert (seen.width, seen.height, seen.eye) == (*size, camera.eye)
+    wide = ListsForm(cell=4, guard=2.0).camera(camera)
+    half = np.tan(np.radians(camera.vfov_deg) / 2)
+    assert np.tan(np.radians(wide.vfov_deg) / 2) == pytest.approx(2 * half)
+
+
+def test_each_form_of_the_lists_is_made_once_and_marched_through():
+    sphere = get_scene("sphere")
+    scene = sphere.load()
+    view = View(scene, sphere.camera("front", 64, 48), 1)
+    points = points_of(TECHNIQUES["certified"], scene, "switches")
+    by_label = {point.label: point for point in points}
+    rays = hrt.mirror_rays(view.gbuffer)
+    found = {}
+    for label in ("base", "no planes", "4x4 cells", "4x4 cells, guard x2", "guard x2"):
+        screen = view.screen(by_label[label])
+        assert view.screen(by_label[label]) is screen
+        found[label] = hrt.march(rays, screen.gbuffer, screen.pyramid, by_label[label].mode)
+    assert view.screen(by_label["4 tests"]) is view.screen(by_label["base"])
+    planes, none = (view.screen(by_label[label]) for label in ("base", "no planes"))
+    assert planes.lists.prim_id is none.lists.prim_id
+    assert np.isnan(none.lists.planes).all()
+    assert not np.isnan(planes.lists.planes).all()
+    assert found["no planes"].tests > found["base"].tests
+    both = found["base"].resolved & found["no planes"].resolved
+    assert both.any()
+    assert (found["base"].prim_id[both] == found["no planes"].prim_id[both]).all()
+    coarse, guarded = (view.screen(by_label[f"4x4 cells{g}"]) for g in ("", ", guard x2"))
+    assert coarse.lists.rest.shape == (12, 16)
+    assert guarded.lists.rest.shape == (24, 32)
+    assert coarse.nbytes < guarded.nbytes < planes.nbytes
+    offscreen = {
+        label: np.count_nonzero(marched.status == hrt.MarchStatus.OFFSCREEN)
+        for label, marched in found.items()
+    }
+    assert offscreen["guard x2"] < offscreen["base"]
+
+
+def test_only_complete_cells_have_all_techniques_and_embrees_modes(cornell):
+    text = TEXT.replace('timed = ["64x48"]', 'timed = ["64x48", "128x96"]\ncomplete = ["64x48"]')
+    experiment = parse_experiment(text, source="x.toml")
+    techniques = {name: get_technique(name) for name in experiment.techniques}
+    small, large = (
+        plan_cells(experiment, techniques, cornell.load(), resolution, 0)[0]
+        for resolution in experiment.resolutions
+    )
+    assert (small.timed, small.rivals, large.timed, large.rivals) == (True, True, True, False)
+    assert {point.technique for point in small.points} == {"paper", "hiz"}
+    assert {point.technique for point in large.points} == {"paper"}
+    assert len(large.points) == 4  # of the whole grid
+    assert large.passes(2) == 4 + 2 * 4
+    other = Resolution(width=32, height=24)
+    only_large = experiment.overridden([experiment.resolutions[1]], None)
+    assert only_large.complete == only_large.timed == [experiment.resolutions[1]]
+    assert experiment.overridden([other], None).complete == [other]
+    assert parse_experiment(TEXT, source="x.toml").overridden([other], None).complete is None
+
+
+def test_a_cell_without_rivals_times_its_points_alone(cornell):
+    loaded = prepare(cornell.load(), 1)
+    view = View(loaded.scene, cornell.camera(next(iter(cornell.cameras)), 64, 48), 1)
+    points = points_of(TECHNIQUES["certified"], loaded.scene, "cheapest")
+    rays = hrt.mirror_rays(view.gbuffer)
+    cell = error_cell.Cell(NearestHit(), rays, points, 2, False, 1024, rivals=False)
+    record = error_cell.measure_cell(loaded, view, cell)
+    assert [row["point"] for row in record.results] == [point.label for point in points]
+    assert len(record.samples) == 2 * len(points)
+    assert all(row["speedup"] > 0 and row["prepare_mib"] > 0 for row in record.results)
 
 
 @pytest.mark.parametrize("workload", ["mirror", "shadow_point"])

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 import hybrid_rt as hrt
 from hybrid_rt_bench import compare, results
-from hybrid_rt_bench.error_cell import _timing_columns
+from hybrid_rt_bench.error_cell import PREPARED, _timing_columns
 from hybrid_rt_bench.pooling import CELL, VERDICTS
 from hybrid_rt_bench.report import error_maps, error_tables, pareto, render_run
 from hybrid_rt_bench.results import MAP_CLASSES
@@ -33,8 +33,9 @@ def result_row(technique, point, default, answers, hits, misses, *, timed=True):
         "resolved": answers, "alpha": answers / RAYS, **counts,
         **{f"all_{name}": counts[name] for name in VERDICTS}, "steps": 20.0 * RAYS,
         "lists_mib": 8.0 if technique == "certified" else 0.0, "tests": 4.0 * RAYS,
-        "prepare_ms": 3.0, "wrong_rate": (hits + misses) / answers, "wrong_low": 0.0,
-        "wrong_high": 1.0, "error_t_p50": 1e-5, "error_t_p99": 1e-3, "error_t_max": 0.5,
+        "prepare_ms": 3.0, "prepare_mib": 9.0, "wrong_rate": (hits + misses) / answers,
+        "wrong_low": 0.0, "wrong_high": 1.0, "error_t_p50": 1e-5, "error_t_p99": 1e-3,
+        "error_t_max": 0.5,
     }  # fmt: skip
     samples = []
     if timed:
@@ -54,7 +55,7 @@ def embree_row(mode, wrong, seconds):
     samples = [
         {**names, "round": k, "hybrid": seconds, "embree": EMBREE_SECONDS} for k in range(ROUNDS)
     ]
-    row |= {"steps": np.nan, "prepare_ms": 0.0, "lists_mib": 0.0, "tests": 0.0}
+    row |= {"steps": np.nan} | dict.fromkeys(PREPARED, 0.0)
     return {**row, **_timing_columns(row, samples)}, samples
 
 

@@ -56,7 +56,7 @@ def table_main(run: RunData) -> Table:
             ]
         )
     table.notes += [
-        f"{_cells_text(rows)}. Answers: the rays that the screen resolves; alpha is their share.",
+        f"{cells_text(rows)}. Answers: the rays that the screen resolves; alpha is their share.",
         "Wrong: a false hit or a false miss, more than a pixel from the truth. Wrong primitive: "
         "another triangle than the true one, within a pixel. All rays: of the hybrid with robust "
         "Embree as its fallback, so that an error of the hand-over is counted.",
@@ -121,13 +121,13 @@ def table_workloads(run: RunData) -> Table:
                     share(pooled),
                     rate_text(pooled.rate(WRONG)),
                     speedup_text(speedup),
-                    _pays(speedup),
+                    pays(speedup),
                     number(pooled.per_second("embree_ms")),
                     number(pooled.mean("prepare_ms")),
                 ]
             )
     table.notes += [
-        f"Default parameters of each technique. {_cells_text(rows)}.",
+        f"Default parameters of each technique. {cells_text(rows)}.",
         "Pays: the interval of the speed-up lies above 1. Data for the march: pyramids, and lists "
         "of primitives if any, made once a view and not counted in the speed-up.",
     ]
@@ -197,9 +197,9 @@ def table_lists(run: RunData) -> list[Table]:
                 ]
             )
     table.notes += [
-        f"{_cells_text(rows)}. A list takes 8 bytes a primitive and 4 for the bound of the rest, "
+        f"{cells_text(rows)}. A list takes 8 bytes a primitive and 4 for the bound of the rest, "
         "for every pixel, full or not; what does not fit makes rays unresolved, never wrong.",
-        "Making them: raster with lists and the conservative pyramid, less the raster without.",
+        "Making them: the lists and the conservative pyramid.",
     ]
     return [table]
 
@@ -317,6 +317,11 @@ def defaults(rows: pd.DataFrame) -> pd.DataFrame:
     return rows[rows.default]
 
 
+def asked_points(run: RunData) -> set[str]:
+    """Return which points the run's workloads asked for: "all", "switches" and the like."""
+    return {entry["points"] for entry in run.meta["spec"].get("workloads", [])}
+
+
 def march_rate(technique: str, pooled: Pooled) -> float:
     """Return Mrays/s of a technique by itself: of its march, or of Embree."""
     return pooled.per_second("hybrid_ms" if technique == EMBREE else "march_ms")
@@ -325,6 +330,11 @@ def march_rate(technique: str, pooled: Pooled) -> float:
 def point_name(technique: str, point: str) -> str:
     """Return what one of the defaults is called; Embree has two."""
     return f"{technique}, {point}" if technique == EMBREE else technique
+
+
+def name_of(technique: str, point: str) -> str:
+    """Return what a point is called where those of mode "certified" stand by themselves."""
+    return point if technique == "certified" else technique
 
 
 def full_name(technique: str, point: str, pooled: Pooled) -> str:
@@ -338,6 +348,11 @@ def full_name(technique: str, point: str, pooled: Pooled) -> str:
 def share(pooled: Pooled) -> str:
     """Return alpha."""
     return f"{pooled.alpha:.3f}"
+
+
+def count_text(rate: Rate) -> str:
+    """Return how many rays were counted, and the upper end of the interval of their rate."""
+    return f"{rate.count:,} [at most {_power(rate.high)}]" if rate.total else "–"
 
 
 def rate_text(rate: Rate) -> str:
@@ -360,7 +375,8 @@ def speedup_text(speedup: stats.Estimate | None) -> str:
     return "–" if speedup is None else interval(speedup.value, speedup.low, speedup.high)
 
 
-def _pays(speedup: stats.Estimate | None) -> str:
+def pays(speedup: stats.Estimate | None) -> str:
+    """Return on which side of 1 the interval of a speed-up lies."""
     if speedup is None:
         return "–"
     return "yes" if speedup.low > 1 else "no" if speedup.high < 1 else "break-even"
@@ -377,7 +393,9 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _cells_text(rows: pd.DataFrame) -> str:
+def cells_text(rows: pd.DataFrame) -> str:
+    """Return which cells rows are of, in words."""
+
     def listed(column: str) -> str:
         return ", ".join(str(value) for value in dict.fromkeys(rows[column]))
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hybrid_rt_bench.report import (
+    ablation,
     error_maps,
     error_tables,
     figures,
@@ -41,9 +42,14 @@ class Form:
     figures: tuple[Callable[[RunData, Path], list[Path]], ...]
 
 
+def _error_tables(run: RunData) -> list[Table]:
+    """Return the tables of those points that have tables of their own, else the usual ones."""
+    return ablation.tables(run) or error_tables.all_tables(run)
+
+
 FORMS = {
     "paper": Form(all_tables, (figures.plots, pictures.figures)),
-    "error": Form(error_tables.all_tables, (pareto.plots, error_maps.figures)),
+    "error": Form(_error_tables, (pareto.plots, error_maps.figures)),
     "stability": Form(stability.tables, (stability.figures,)),
     "scaling": Form(scaling.tables, (scaling_figures.plots,)),
     "peers": Form(peers.tables, (peers.figures,)),
