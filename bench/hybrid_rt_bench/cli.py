@@ -113,6 +113,8 @@ def run(
 
     * `hybrid-rt run ablation --quick` - each switch of the certified march by itself
 
+    * `hybrid-rt run hybrid --quick` - the hybrid's speed-up over Embree, by scene and size
+
     * `hybrid-rt run paper --scenes sponza --cameras nave --resolutions 1920x1080 --rounds 15`
 
     * `hybrid-rt run paper --scenes hall.glb --json > hall.json` - a mesh file of your own

@@ -139,3 +139,37 @@ def test_wrong_settings_are_refused_before_measuring(
     assert code == 2
     assert said in err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("points", "title"),
+    [
+        ("switches", "What each part of the certified march is worth"),
+        ("cheapest", "Speed-up of the certified hybrid over the strongest Embree"),
+    ],
+)
+def test_points_with_tables_of_their_own(monkeypatch, capsys, tmp_path, points, title):
+    """What `run ablation` and `run hybrid` do, on one small view at two sizes."""
+    text = TINY.replace('"paper", "hiz", "certified"', '"certified", "paper"')
+    text = text.replace('counted = ["paper", "certified"]', 'counted = ["certified"]')
+    text = text.replace('timed = ["64x48"]', 'timed = ["64x48", "80x60"]\ncomplete = ["64x48"]')
+    text = text.replace('picture = "64x48"\n', "").split("[[workloads]]")[0]
+    text += f'[[workloads]]\nname = "mirror"\npoints = "{points}"\n[[scenes]]\nname = "cornell"\n'
+    path = tmp_path / "tiny.toml"
+    path.write_text(text)
+    code, out, err = run(
+        monkeypatch, capsys, "run", path, "--threads", 1, "--rounds", 1, "--out", tmp_path
+    )
+    assert code == 0, err
+    assert "100 % done" in err
+    assert title in out
+    folder = next(path.parent for path in tmp_path.glob("*/run.json"))
+    assert f"### {title}" in (folder / "tables.md").read_text()
+    results = pd.read_parquet(folder / "results.parquet")
+    by_size = {width: set(part.technique) for width, part in results.groupby("width")}
+    assert by_size == {64: {"certified", "paper", "embree"}, 80: {"certified"}}
+    certified = results[results.technique == "certified"]
+    assert (certified[["false_hit", "false_miss", "wrong_primitive"]].to_numpy() == 0).all()
+    assert certified.resolved.sum() > 1000
+    assert "flip" not in results
+    assert not (folder / "pictures").exists()

@@ -12,6 +12,7 @@ from hybrid_rt_bench.report import (
     error_maps,
     error_tables,
     figures,
+    goal,
     pareto,
     peers,
     pictures,
@@ -44,7 +45,7 @@ class Form:
 
 def _error_tables(run: RunData) -> list[Table]:
     """Return the tables of those points that have tables of their own, else the usual ones."""
-    return ablation.tables(run) or error_tables.all_tables(run)
+    return [*ablation.tables(run), *goal.tables(run)] or error_tables.all_tables(run)
 
 
 FORMS = {
