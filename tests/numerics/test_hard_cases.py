@@ -61,7 +61,8 @@ def built(name):
 @functools.cache
 def graded(mode, name):
     case = built(name)
-    chosen = MODES[mode]()
+    # All that certified can prove, and not only what its budgets let it.
+    chosen = hrt.Certified(64, None) if mode == "certified" else MODES[mode]()
     if case.max_steps is not None and hasattr(chosen, "max_steps"):
         chosen = dataclasses.replace(chosen, max_steps=case.max_steps)
     pyramid = hrt.build_depth_pyramid(case.gbuffer)

@@ -274,7 +274,7 @@ def test_budgets():
     scene = random_scene(rng, 200, spread=1.5)
     camera = hrt.Camera.look_at((0, 0, 6), (0, 0, 0), width=64, height=48)
     rays = hrt.mirror_rays(hrt.rasterize(scene, camera))
-    free = certified(scene, camera, rays, 8)
+    free = certified(scene, camera, rays, 8, hrt.Certified(64, None))
     assert (free.status != S.EXHAUSTED).all()
     for mode in (hrt.Certified(max_tests=1), hrt.Certified(max_steps=5)):
         tight = certified(scene, camera, rays, 8, mode)
