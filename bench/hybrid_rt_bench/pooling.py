@@ -125,6 +125,11 @@ class Pooled:
         groups = [(mine[over] / mine[under]).to_numpy() for mine in self._samples_by_row(samples)]
         return stats.geometric_mean_of_medians(groups) if groups else None
 
+    def free_march(self, samples: pd.DataFrame) -> stats.Estimate | None:
+        """Return `speedup` as it would be if the march took no time: the most that it can be."""
+        rest = samples.assign(rest=samples["hybrid"] - samples["march"])
+        return self.ratio(rest, "embree", "rest")
+
     def may_cost(self, samples: pd.DataFrame) -> float:
         """Return what the march may cost, ns a ray, for the hybrid to break even.
 

@@ -121,6 +121,8 @@ def test_each_switch_is_shown_against_the_base(switches):
     assert left == "29700"
     speedup = ((0.8 + 0.55) ** 2 * (1.6 + 0.55)) ** (-1 / 3)
     assert base["speed-up, measured"].split()[0] == f"{speedup:.3f}"
+    free = [row["if the march took no time"] for row in (base, planes, paper)]
+    assert free == ["1.82 [1.82, 1.82]"] * 3  # 1 / 0.55
     assert base["wrong"] == "0 [at most 1.2e-04]"  # 3 / 25000
     assert paper["wrong"] == "90 [at most 3.7e-03]"  # of 30000, Clopper and Pearson
     assert (base["alpha"], base["steps a ray"], base["exact tests a ray"]) == (
@@ -180,6 +182,7 @@ def test_the_goal_is_shown_camera_by_camera(hybrid):
     a, b = (row_of(table, name) for name in "ab")
     assert a["speed-up, measured"].startswith(f"{1 / 1.35:.3f} [")
     assert b["march, ns a ray"] == f"{1.1 * 1.6e9 / 10_000:.0f}"
+    assert b["if the march took no time"] == "1.82 [1.82, 1.82]"
     assert a["may cost, ns a ray"] == f"{1.1 * 0.45e9 / 10_000:.0f}"
 
 
