@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+from hybrid_rt.kernels import simd
+from hybrid_rt.kernels._jit import inlined, parallel_kernel
 from hybrid_rt.kernels._queue import fetch_add
 
 CHUNK = 4096  # rays counted together
+
+F32, I32 = np.float32, np.int32
 
 
 @parallel_kernel
@@ -67,58 +70,63 @@ def hand_over(indices, origin, direction, t_near, t_free, reach, starts):
             starts[i] = start
 
 
-@kernel
-def barycentrics(ax, ay, az, bx, by, bz, cx, cy, cz, nx, ny, nz, px, py, pz):
-    """Return (u, v) of a point of the plane of triangle abc, n being cross(b - a, c - a)."""
-    inv = 1.0 / (nx * nx + ny * ny + nz * nz)
-    qx, qy, qz = px - ax, py - ay, pz - az
-    e1x, e1y, e1z = bx - ax, by - ay, bz - az
-    e2x, e2y, e2z = cx - ax, cy - ay, cz - az
-    u = ((qy * e2z - qz * e2y) * nx + (qz * e2x - qx * e2z) * ny + (qx * e2y - qy * e2x) * nz) * inv
-    v = ((e1y * qz - e1z * qy) * nx + (e1z * qx - e1x * qz) * ny + (e1x * qy - e1y * qx) * nz) * inv
-    return u, v
-
-
-@kernel
-def answer(i, origin, direction, prim, distance, vertices, faces, t, prim_id, u, v, n_g):
-    """Write the hit of ray i on primitive `prim` at t = `distance`, or a miss for -1."""
-    t[i] = distance
-    prim_id[i] = prim
-    if prim < 0:
-        u[i] = 0.0
-        v[i] = 0.0
-        for axis in range(3):
-            n_g[i, axis] = 0.0
-        return
-    a, b, c = faces[prim, 0], faces[prim, 1], faces[prim, 2]
-    ax, ay, az = np.float64(vertices[a, 0]), np.float64(vertices[a, 1]), np.float64(vertices[a, 2])
-    bx, by, bz = np.float64(vertices[b, 0]), np.float64(vertices[b, 1]), np.float64(vertices[b, 2])
-    cx, cy, cz = np.float64(vertices[c, 0]), np.float64(vertices[c, 1]), np.float64(vertices[c, 2])
-    nx = (by - ay) * (cz - az) - (bz - az) * (cy - ay)
-    ny = (bz - az) * (cx - ax) - (bx - ax) * (cz - az)
-    nz = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-    uu, vv = barycentrics(
-        ax,
-        ay,
-        az,
-        bx,
-        by,
-        bz,
-        cx,
-        cy,
-        cz,
-        nx,
-        ny,
-        nz,
-        origin[i, 0] + np.float64(distance) * direction[i, 0],
-        origin[i, 1] + np.float64(distance) * direction[i, 1],
-        origin[i, 2] + np.float64(distance) * direction[i, 2],
+@inlined
+def vertex(vertices, faces, face, corner, m):
+    """Return a corner of triangles, float64; face: 3 times their numbers, for lanes m."""
+    at = simd.gather(faces, face + I32(corner), m, I32(0)) * I32(3)
+    return (
+        simd.to_f64(simd.gather(vertices, at, m, F32(0.0))),
+        simd.to_f64(simd.gather(vertices, at + I32(1), m, F32(0.0))),
+        simd.to_f64(simd.gather(vertices, at + I32(2), m, F32(0.0))),
     )
-    u[i] = uu
-    v[i] = vv
-    n_g[i, 0] = nx
-    n_g[i, 1] = ny
-    n_g[i, 2] = nz
+
+
+@inlined
+def point(origin, direction, at, axis, distance, m):
+    """Return a coordinate of the point at a distance along rays, float64, for lanes m."""
+    o = simd.to_f64(simd.gather(origin, at + I32(axis), m, F32(0.0)))
+    return o + distance * simd.to_f64(simd.gather(direction, at + I32(axis), m, F32(0.0)))
+
+
+@inlined
+def answer(
+    resolved, origin, direction, march_prim, march_t, vertices, faces, t, prim_id, u, v, n_g
+):
+    """Write the hits, or misses for march_prim -1, of those rays (n,) that are resolved.
+
+    n_g is cross(b - a, c - a); u, v are the barycentrics of the point at march_t in the plane of
+    the triangle.
+    """
+    n = resolved.shape[0]
+    for k in range(0, n, simd.WIDTH):
+        live = simd.load_masked(resolved, k, simd.first(n - k), False)
+        if not simd.any_(live):
+            continue
+        prim = simd.load_masked(march_prim, k, live, I32(-1))
+        distance = simd.load_masked(march_t, k, live, F32(0.0))
+        hit = prim >= I32(0)
+        at = (simd.iota() + I32(k)) * I32(3)
+        face = prim * I32(3)
+        ax, ay, az = vertex(vertices, faces, face, 0, hit)
+        bx, by, bz = vertex(vertices, faces, face, 1, hit)
+        cx, cy, cz = vertex(vertices, faces, face, 2, hit)
+        e1x, e1y, e1z = bx - ax, by - ay, bz - az
+        e2x, e2y, e2z = cx - ax, cy - ay, cz - az
+        nx, ny, nz = e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x
+        inv = 1.0 / (nx * nx + ny * ny + nz * nz)
+        along = simd.to_f64(distance)
+        qx = point(origin, direction, at, 0, along, hit) - ax
+        qy = point(origin, direction, at, 1, along, hit) - ay
+        qz = point(origin, direction, at, 2, along, hit) - az
+        uu = (qy * e2z - qz * e2y) * nx + (qz * e2x - qx * e2z) * ny + (qx * e2y - qy * e2x) * nz
+        vv = (e1y * qz - e1z * qy) * nx + (e1z * qx - e1x * qz) * ny + (e1x * qy - e1y * qx) * nz
+        simd.store_masked(t, k, distance, live)
+        simd.store_masked(prim_id, k, prim, live)
+        simd.store_masked(u, k, simd.to_f32(simd.select(hit, uu * inv, 0.0)), live)
+        simd.store_masked(v, k, simd.to_f32(simd.select(hit, vv * inv, 0.0)), live)
+        simd.scatter(n_g, at, simd.to_f32(simd.select(hit, nx, 0.0)), live)
+        simd.scatter(n_g, at + I32(1), simd.to_f32(simd.select(hit, ny, 0.0)), live)
+        simd.scatter(n_g, at + I32(2), simd.to_f32(simd.select(hit, nz, 0.0)), live)
 
 
 @parallel_kernel
@@ -143,10 +151,10 @@ def answer_hits(
     for _worker in prange(workers):
         first = fetch_add(taken.ctypes.data, CHUNK)
         while first < n:
-            for i in range(first, min(n, first + CHUNK)):
-                if resolved[i]:
-                    answer(
-                        i, origin, direction, march_prim[i], march_t[i], vertices, faces,
-                        t, prim_id, u, v, n_g,
-                    )  # fmt: skip
+            last = min(n, first + CHUNK)
+            answer(
+                resolved[first:last], origin[first:last], direction[first:last],
+                march_prim[first:last], march_t[first:last], vertices, faces,
+                t[first:last], prim_id[first:last], u[first:last], v[first:last], n_g[first:last],
+            )  # fmt: skip
             first = fetch_add(taken.ctypes.data, CHUNK)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt.kernels.hybrid import CHUNK
+from hybrid_rt.kernels.hybrid import CHUNK, answer_hits
 
 S = hrt.MarchStatus
 
@@ -63,6 +63,39 @@ def test_answers_of_the_march_are_complete_hits(case):
     on_triangle = (1 - u - v) * a + u * b + v * c
     on_ray = rays.origin[r] + hits.t[r, None] * rays.direction[r]
     np.testing.assert_allclose(on_triangle, on_ray, atol=2e-4)
+
+
+def answered(resolved, rays, prim, distance, scene):
+    """Return (t, prim_id, u, v, n_g) by NumPy in float64, -7 in the rows of unresolved rays."""
+    a, b, c = (scene.vertices[scene.faces[prim, k]].astype(float) for k in range(3))
+    normal = np.cross(b - a, c - a)
+    q = rays.origin + distance[:, None].astype(float) * rays.direction - a
+    with np.errstate(invalid="ignore"):
+        u = (np.cross(q, c - a) * normal).sum(axis=1) / (normal**2).sum(axis=1)
+        v = (np.cross(b - a, q) * normal).sum(axis=1) / (normal**2).sum(axis=1)
+    hit = prim >= 0
+    normal[~hit], u[~hit], v[~hit] = 0, 0, 0
+    rows = distance, prim, u, v, normal
+    return [np.where(resolved if x.ndim == 1 else resolved[:, None], x, -7) for x in rows]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.6, 1.0])
+@pytest.mark.parametrize("n", [1, 7, 16, 33, 1000, CHUNK + 5])
+def test_rows_of_resolved_rays_are_written_and_no_others(case, n, share):
+    scene, _buffer, rays, _pyramid, _tracer = case
+    rng = np.random.default_rng(n)
+    rays = rays.take(np.arange(n))
+    resolved = rng.random(n) < share
+    prim = rng.integers(-1, len(scene.faces), n).astype(np.int32)
+    distance = np.where(prim < 0, np.inf, rng.uniform(0, 5, n)).astype(np.float32)
+    rows = [np.full(n, -7, t) for t in (np.float32, np.int32, np.float32, np.float32)]
+    rows.append(np.full((n, 3), -7, np.float32))
+    answer_hits(
+        2, resolved, rays.origin, rays.direction, prim, distance, scene.vertices, scene.faces,
+        *rows,
+    )  # fmt: skip
+    for got, expected in zip(rows, answered(resolved, rays, prim, distance, scene), strict=True):
+        np.testing.assert_allclose(got, expected, rtol=2e-6, atol=1e-6)
 
 
 def test_most_answers_of_the_march_agree_with_the_tracer(case):
