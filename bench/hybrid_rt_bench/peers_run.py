@@ -19,7 +19,7 @@ from hybrid_rt_bench.peers_cell import Contender
 from hybrid_rt_bench.plan import Plan, PlannedScene, make_plan
 from hybrid_rt_bench.progress import Reporter
 from hybrid_rt_bench.results import ReportsError, RunWriter
-from hybrid_rt_bench.run import Outcome, carry_out, fail, reason_of
+from hybrid_rt_bench.run import Outcome, carry_out, fail, note_scene, reason_of
 from hybrid_rt_bench.spec_base import Resolution
 from hybrid_rt_bench.spec_peers import PeersExperiment
 
@@ -97,17 +97,7 @@ class _Run:
             fail(self.writer, self.reporter, name, "", None, reason_of(error))
             self.reporter.advance(views)
             return
-        self.writer.meta["scenes"].append(
-            {
-                "name": name,
-                "title": planned.spec.title,
-                "row": planned.row,
-                "builtin": planned.spec.builtin,
-                "triangles": len(scene),
-                "zero_area": scene.zero_area,
-                "build_seconds": {"robust": base.build_seconds},
-            }
-        )
+        note_scene(planned, scene, {"robust": base.build_seconds}, self.writer)
         contenders = [self._contender(peer, scene, base) for peer in self.chosen]
         try:
             for camera in planned.cameras:

@@ -13,7 +13,7 @@ from hybrid_rt_bench.peers.ours import Embree
 from hybrid_rt_bench.plan import Plan, PlannedScene, make_plan
 from hybrid_rt_bench.progress import Reporter
 from hybrid_rt_bench.results import ReportsError, RunWriter
-from hybrid_rt_bench.run import Outcome, carry_out, fail, reason_of
+from hybrid_rt_bench.run import Outcome, carry_out, fail, note_scene, reason_of
 from hybrid_rt_bench.spec_base import Resolution
 from hybrid_rt_bench.spec_roofline import RooflineExperiment
 
@@ -78,7 +78,7 @@ def _measure_scene(
     writer: RunWriter,
     reporter: Reporter,
 ) -> None:
-    name, views = planned.spec.name, len(planned.cameras) * len(experiment.resolutions)
+    name, views = planned.name, len(planned.cameras) * len(experiment.resolutions)
     reporter.doing(f"loading {name}")
     try:
         scene = planned.spec.load(size=planned.size)
@@ -87,27 +87,15 @@ def _measure_scene(
         fail(writer, reporter, name, "", None, reason_of(error))
         reporter.advance(views * experiment.rounds)
         return
-    writer.meta["scenes"].append(
-        {
-            "name": name,
-            "title": planned.spec.title,
-            "row": planned.row,
-            "builtin": planned.spec.builtin,
-            "triangles": len(scene),
-            "zero_area": scene.zero_area,
-            "build_seconds": {"robust": base.build_seconds},
-        }
-    )
+    note_scene(planned, scene, {"robust": base.build_seconds}, writer)
     for camera in planned.cameras:
         for resolution in experiment.resolutions:
-            _measure_view(
-                experiment, planned.spec, base, camera, resolution, threads, writer, reporter
-            )
+            _measure_view(experiment, planned, base, camera, resolution, threads, writer, reporter)
 
 
 def _measure_view(
     experiment: RooflineExperiment,
-    spec: hrs.SceneSpec,
+    planned: PlannedScene,
     base: Embree,
     camera: str,
     resolution: Resolution,
@@ -115,7 +103,7 @@ def _measure_view(
     writer: RunWriter,
     reporter: Reporter,
 ) -> None:
-    name = f"{spec.name}, {camera}, {resolution}"
+    name = f"{planned.name}, {camera}, {resolution}"
     reporter.doing(name)
     done = 0
 
@@ -125,17 +113,17 @@ def _measure_view(
         reporter.advance()
 
     try:
-        seen = spec.camera(camera, resolution.width, resolution.height)
+        seen = planned.spec.camera(camera, resolution.width, resolution.height)
         record = roofline_cell.measure_cell(base, seen, name, experiment, threads, on_round)
     except ReportsError:
         raise
     except Exception as error:  # one bad cell must not cost the others
         reporter.advance(experiment.rounds - done)
-        fail(writer, reporter, spec.name, camera, resolution, reason_of(error))
+        fail(writer, reporter, planned.name, camera, resolution, reason_of(error))
         return
     size = {"width": resolution.width, "height": resolution.height}
     writer.add_cell(
-        {"scene": spec.name, "camera": camera, **size, **record.details},
+        {"scene": planned.name, "camera": camera, **size, **record.details},
         record.samples,
         record.results,
         [],

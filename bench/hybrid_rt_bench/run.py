@@ -247,6 +247,14 @@ def load_planned(planned: PlannedScene, threads: int, writer: RunWriter) -> meas
     """Load a scene, build its tracers and note it in the run."""
     scene = planned.spec.load(size=planned.size)
     loaded = measure.prepare(scene, threads)
+    note_scene(planned, scene, loaded.build_seconds, writer)
+    return loaded
+
+
+def note_scene(
+    planned: PlannedScene, scene: hrt.Scene, build_seconds: dict[str, float], writer: RunWriter
+) -> None:
+    """Note in the run a scene that was loaded, and what each of its structures took to build."""
     writer.meta["scenes"].append(
         {
             "name": planned.name,
@@ -255,10 +263,9 @@ def load_planned(planned: PlannedScene, threads: int, writer: RunWriter) -> meas
             "builtin": planned.spec.builtin,
             "triangles": len(scene),
             "zero_area": scene.zero_area,
-            "build_seconds": loaded.build_seconds,
+            "build_seconds": build_seconds,
         }
     )
-    return loaded
 
 
 def fail(
