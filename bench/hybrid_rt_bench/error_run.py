@@ -22,6 +22,7 @@ from hybrid_rt_bench.results import ReportsError, RunWriter
 from hybrid_rt_bench.run import (
     Outcome,
     carry_out,
+    cell_keys,
     fail,
     load_planned,
     reason_of,
@@ -231,14 +232,7 @@ class _Run:
             self._advance(whole - (self.done - before))
             return
         self.writer.add_cell(
-            {
-                "scene": planned.name,
-                "camera": camera,
-                "width": resolution.width,
-                "height": resolution.height,
-                **keys,
-                **record.details,
-            },
+            {**cell_keys(planned.name, camera, resolution), **keys, **record.details},
             record.samples,
             record.results,
             record.verdicts,

@@ -20,8 +20,7 @@ import numpy as np
 import hybrid_rt as hrt
 from hybrid_rt.kernels import certified_simd as lanes
 from hybrid_rt_bench import roofline, stats, strongest
-from hybrid_rt_bench.measure import CellError
-from hybrid_rt_bench.peers.ours import Embree
+from hybrid_rt_bench.measure import CellError, LoadedScene
 from hybrid_rt_bench.spec_roofline import RooflineExperiment
 
 Row = dict[str, Any]
@@ -44,7 +43,7 @@ class RooflineRecord:
 
 
 def measure_cell(
-    base: Embree,
+    loaded: LoadedScene,
     camera: hrt.Camera,
     name: str,
     experiment: RooflineExperiment,
@@ -55,8 +54,7 @@ def measure_cell(
 
     Parameters
     ----------
-    base : Embree
-        Over the scene.
+    loaded : LoadedScene
     camera : Camera
     name : str
         Of the view, in messages.
@@ -71,12 +69,12 @@ def measure_cell(
     CellError
         The camera sees no surface, or the view is too large for the lanes.
     """
-    gbuffer = hrt.rasterize(base.scene, camera, lists=experiment.lists, threads=threads)
+    gbuffer = hrt.rasterize(loaded.scene, camera, lists=experiment.lists, threads=threads)
     pyramid = hrt.build_depth_pyramid(gbuffer, conservative=True, threads=threads)
     rays = hrt.mirror_rays(gbuffer)
     if len(rays) == 0:
         raise CellError(f"{name}: the camera sees no surface, so there are no mirror rays")
-    choice = strongest.choose(base.candidates, rays, experiment.selection_rays)
+    choice = strongest.choose(loaded.candidates, rays, experiment.selection_rays)
     counts = thread_counts(threads)
     stages = [
         _Stages(rays, gbuffer, pyramid, choice.best.tracer.with_path(threads=n), n) for n in counts

@@ -9,11 +9,19 @@ from pathlib import Path
 import hybrid_rt as hrt
 import hybrid_rt_scenes as hrs
 from hybrid_rt_bench import env, rates, roofline_cell
-from hybrid_rt_bench.peers.ours import Embree
+from hybrid_rt_bench.measure import LoadedScene, prepare
 from hybrid_rt_bench.plan import Plan, PlannedScene, make_plan
 from hybrid_rt_bench.progress import Reporter
-from hybrid_rt_bench.results import ReportsError, RunWriter
-from hybrid_rt_bench.run import Outcome, carry_out, fail, note_scene, reason_of
+from hybrid_rt_bench.results import RunWriter
+from hybrid_rt_bench.run import (
+    Outcome,
+    carry_out,
+    cell_keys,
+    fail,
+    load_planned,
+    measured,
+    reason_of,
+)
 from hybrid_rt_bench.spec_base import Resolution
 from hybrid_rt_bench.spec_roofline import RooflineExperiment
 
@@ -81,22 +89,22 @@ def _measure_scene(
     name, views = planned.name, len(planned.cameras) * len(experiment.resolutions)
     reporter.doing(f"loading {name}")
     try:
-        scene = planned.spec.load(size=planned.size)
-        base = Embree(scene, threads)
+        loaded = load_planned(planned, threads, writer)
     except (hrt.HybridRTError, MemoryError) as error:
         fail(writer, reporter, name, "", None, reason_of(error))
         reporter.advance(views * experiment.rounds)
         return
-    note_scene(planned, scene, {"robust": base.build_seconds}, writer)
     for camera in planned.cameras:
         for resolution in experiment.resolutions:
-            _measure_view(experiment, planned, base, camera, resolution, threads, writer, reporter)
+            _measure_view(
+                experiment, planned, loaded, camera, resolution, threads, writer, reporter
+            )
 
 
 def _measure_view(
     experiment: RooflineExperiment,
     planned: PlannedScene,
-    base: Embree,
+    loaded: LoadedScene,
     camera: str,
     resolution: Resolution,
     threads: int,
@@ -105,25 +113,24 @@ def _measure_view(
 ) -> None:
     name = f"{planned.name}, {camera}, {resolution}"
     reporter.doing(name)
-    done = 0
-
-    def on_round() -> None:
-        nonlocal done
-        done += 1
-        reporter.advance()
-
-    try:
-        seen = planned.spec.camera(camera, resolution.width, resolution.height)
-        record = roofline_cell.measure_cell(base, seen, name, experiment, threads, on_round)
-    except ReportsError:
-        raise
-    except Exception as error:  # one bad cell must not cost the others
-        reporter.advance(experiment.rounds - done)
-        fail(writer, reporter, planned.name, camera, resolution, reason_of(error))
+    record = measured(
+        lambda on_round: roofline_cell.measure_cell(
+            loaded,
+            planned.spec.camera(camera, resolution.width, resolution.height),
+            name,
+            experiment,
+            threads,
+            on_round,
+        ),
+        experiment.rounds,
+        (planned.name, camera, resolution),
+        writer,
+        reporter,
+    )
+    if record is None:
         return
-    size = {"width": resolution.width, "height": resolution.height}
     writer.add_cell(
-        {"scene": planned.name, "camera": camera, **size, **record.details},
+        {**cell_keys(planned.name, camera, resolution), **record.details},
         record.samples,
         record.results,
         [],
@@ -140,10 +147,10 @@ def _compile(experiment: RooflineExperiment, threads: int) -> dict[str, float]:
     """Have everything compiled that is timed, on a tiny view, and return the seconds of it."""
     start = time.perf_counter()
     spec = hrs.get_scene("cornell")
-    base = Embree(spec.load(), threads)
+    loaded = prepare(spec.load(), threads)
     once = experiment.model_copy(update={"rounds": 1, "selection_rays": 1024})
     camera = spec.camera(next(iter(spec.cameras)), 64, 48)
-    roofline_cell.measure_cell(base, camera, "compiling", once, threads)
+    roofline_cell.measure_cell(loaded, camera, "compiling", once, threads)
     marched = time.perf_counter()
     rates.measure([16384], roofline_cell.thread_counts(threads), 1, 1e-6)
     return {"march": marched - start, "rates": time.perf_counter() - marched}

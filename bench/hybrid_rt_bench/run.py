@@ -6,7 +6,7 @@ import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numba
 
@@ -205,15 +205,8 @@ def _measure_one(
 ) -> None:
     name = f"{planned.name}, {camera}, {resolution}"
     reporter.doing(name)
-    done = 0
-
-    def on_round() -> None:
-        nonlocal done
-        done += 1
-        reporter.advance()
-
-    try:
-        record = measure.measure_cell(
+    record = measured(
+        lambda on_round: measure.measure_cell(
             loaded,
             planned.spec.camera(camera, resolution.width, resolution.height),
             name,
@@ -221,15 +214,16 @@ def _measure_one(
             techniques,
             threads,
             on_round,
-        )
-    except ReportsError:
-        raise
-    except Exception as error:  # one bad cell must not cost the others
-        reporter.advance(experiment.warmup + experiment.rounds - done)
-        fail(writer, reporter, planned.name, camera, resolution, reason_of(error))
+        ),
+        experiment.warmup + experiment.rounds,
+        (planned.name, camera, resolution),
+        writer,
+        reporter,
+    )
+    if record is None:
         return
     writer.add_cell(
-        {**_keys(planned.name, camera, resolution), **record.details},
+        {**cell_keys(planned.name, camera, resolution), **record.details},
         record.samples,
         record.results,
         record.verdicts,
@@ -241,6 +235,38 @@ def _measure_one(
             f"{name}: alpha {row['alpha']:.3f}, Embree {row['embree_ms']:.1f} ms, "
             f"hybrid {row['hybrid_ms']:.1f} ms, measured speed-up {row['measured']:.3f}"
         )
+
+
+Record = TypeVar("Record")
+
+
+def measured(
+    measure: Callable[[Callable[[], None]], Record],
+    rounds: int,
+    where: tuple[str, str, Resolution],
+    writer: RunWriter,
+    reporter: Reporter,
+) -> Record | None:
+    """Return what `measure` returns, which is given what to call after each of its rounds.
+
+    A cell that raises must not cost the others: it is kept as failed, its scene, camera and
+    resolution being `where`, its rounds count as done, and None is returned.
+    """
+    done = 0
+
+    def on_round() -> None:
+        nonlocal done
+        done += 1
+        reporter.advance()
+
+    try:
+        return measure(on_round)
+    except ReportsError:
+        raise
+    except Exception as error:
+        reporter.advance(rounds - done)
+        fail(writer, reporter, *where, reason_of(error))
+        return None
 
 
 def load_planned(planned: PlannedScene, threads: int, writer: RunWriter) -> measure.LoadedScene:
@@ -280,10 +306,11 @@ def fail(
     """Say and keep that a cell failed; `more` are its further keys."""
     where = ", ".join(str(part) for part in (scene, camera, resolution, *more.values()) if part)
     reporter.say(f"failed: {where}: {reason}", "bold red")
-    writer.fail_cell({**_keys(scene, camera, resolution), **more}, reason)
+    writer.fail_cell({**cell_keys(scene, camera, resolution), **more}, reason)
 
 
-def _keys(scene: str, camera: str, resolution: Resolution | None) -> dict[str, Any]:
+def cell_keys(scene: str, camera: str, resolution: Resolution | None) -> dict[str, Any]:
+    """Return what says which view a cell is of."""
     width, height = (resolution.width, resolution.height) if resolution else (0, 0)
     return {"scene": scene, "camera": camera, "width": width, "height": height}
 

@@ -13,7 +13,7 @@ from hybrid_rt.kernels import certified_simd as lanes
 from hybrid_rt.kernels.simd import WIDTH
 from hybrid_rt_bench import cli, rates, results, roofline, roofline_cell, roofline_run
 from hybrid_rt_bench import rates_kernels as kernels
-from hybrid_rt_bench.peers.ours import Embree
+from hybrid_rt_bench.measure import prepare
 from hybrid_rt_bench.report import render_run
 from hybrid_rt_bench.report import roofline as report
 from hybrid_rt_bench.spec import load_experiment, parse_experiment
@@ -179,7 +179,7 @@ def record():
     experiment = parse_experiment(TEXT, source="tiny.toml")
     done = []
     found = roofline_cell.measure_cell(
-        Embree(spec.load(), 1), camera, "a view", experiment, 1, lambda: done.append(1)
+        prepare(spec.load(), 1), camera, "a view", experiment, 1, lambda: done.append(1)
     )
     assert len(done) == 2
     return spec.load(), camera, found
@@ -220,7 +220,7 @@ def test_a_view_of_nothing_is_refused(record):
     away = hrt.Camera.look_at((50, 50, 50), (60, 60, 60), width=8, height=8)
     experiment = parse_experiment(TEXT, source="tiny.toml")
     with pytest.raises(hrt.HybridRTError, match="a view: the camera sees no surface"):
-        roofline_cell.measure_cell(Embree(scene, 1), away, "a view", experiment, 1)
+        roofline_cell.measure_cell(prepare(scene, 1), away, "a view", experiment, 1)
 
 
 def test_a_run_is_kept_and_shown_again(monkeypatch, tmp_path, capsys):
