@@ -11,10 +11,10 @@ from typing import Any
 import hybrid_rt as hrt
 import hybrid_rt_scenes as hrs
 from hybrid_rt_bench import env, error_cell
-from hybrid_rt_bench.error_spec import ErrorExperiment, WorkloadEntry
+from hybrid_rt_bench.error_spec import ErrorExperiment, Which, WorkloadEntry
 from hybrid_rt_bench.measure import CellError, LoadedScene, prepare
 from hybrid_rt_bench.plan import Plan, PlannedScene, make_plan
-from hybrid_rt_bench.points import Point, View, Which, points_of
+from hybrid_rt_bench.points import Point, View, points_of
 from hybrid_rt_bench.pooling import CELL
 from hybrid_rt_bench.progress import Reporter
 from hybrid_rt_bench.queries import query_of

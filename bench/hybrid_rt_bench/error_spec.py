@@ -9,6 +9,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validat
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt_bench.spec_base import Resolution, ResolutionText, SceneExperiment
 
+Which = Literal["all", "default", "switches", "cheapest"]
+"""Which points of a technique are measured; see `hybrid_rt_bench.points.points_of`."""
+
 
 class WorkloadEntry(BaseModel):
     """One kind of rays of an experiment.
@@ -28,7 +31,7 @@ class WorkloadEntry(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str = Field(min_length=1)
-    points: Literal["all", "default", "switches", "cheapest"] = "default"
+    points: Which = "default"
     cameras: int | None = Field(default=None, ge=0)
     seeds: int = Field(default=1, ge=1)
 

@@ -37,10 +37,12 @@ class PlannedScene:
     @property
     def name(self) -> str:
         """What results call it: the scene's name, and its size where one was asked for."""
-        if self.size is None:
-            return self.spec.name
-        power = self.size.bit_length() - 1
-        return f"{self.spec.name} {f'2^{power}' if self.size == 2**power else self.size}"
+        return self.spec.name if self.size is None else f"{self.spec.name} {size_text(self.size)}"
+
+
+def size_text(size: int) -> str:
+    """Return a number of triangles, > 0, as it is written: a power of two as 2^n."""
+    return f"2^{size.bit_length() - 1}" if size & (size - 1) == 0 else str(size)
 
 
 @dataclass

@@ -6,17 +6,15 @@ import dataclasses
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 import hybrid_rt as hrt
 from hybrid_rt.certified import LENGTH
 from hybrid_rt.lists import primitive_lists
+from hybrid_rt_bench.error_spec import Which
 from hybrid_rt_bench.techniques import Technique
-
-Which = Literal["all", "default", "switches", "cheapest"]
-"""Which points of a technique are measured; see `points_of`."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ class ListsForm:
         return wide.resized(max(1, wide.width // self.cell), max(1, wide.height // self.cell))
 
 
-LISTS = tuple(dict.fromkeys((2, 4, 8, LENGTH, 16)))
+LISTS = (2, 4, LENGTH, 16)
 """Lengths of the lists of primitives a pixel with which "certified" is measured."""
 
 Changes = dict[str, Any]

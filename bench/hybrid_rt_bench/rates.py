@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from hybrid_rt.kernels.simd import WIDTH
 from hybrid_rt_bench import rates_kernels as kernels
 
-KINDS = {
-    "gather": "gathers, independent",
-    "chain": "gathers, each waits for the last",
-    "load": "contiguous loads",
+KINDS: dict[str, Any] = {
+    "gather": kernels.gather_all,  # independent of each other
+    "chain": kernels.chain_all,  # each waits for the last
+    "load": kernels.load_all,  # of neighbours
 }
-"""What is measured, with what reports call it."""
+"""What is measured, with the kernel that does it."""
 
 ELEMENT = 4
 """Bytes of a float32."""
@@ -82,7 +82,7 @@ def measure(
             tables = {"gather": plain, "chain": cycle(bits), "load": plain}
             numba.set_num_threads(1)
             enough = {
-                kind: _enough(_RUNS[kind], table, bits, seconds, clock)
+                kind: _enough(KINDS[kind], table, bits, seconds, clock)
                 for kind, table in tables.items()
             }
             for workers in threads:
@@ -91,7 +91,7 @@ def measure(
                     times = []
                     for _ in range(repeats):
                         start = clock()
-                        _RUNS[kind](workers, table, bits, enough[kind], np.zeros(workers, F32))
+                        KINDS[kind](workers, table, bits, enough[kind], np.zeros(workers, F32))
                         times.append(clock() - start)
                     ns = 1e9 * min(times) / enough[kind]
                     rows.append(
@@ -107,13 +107,6 @@ def measure(
     finally:
         numba.set_num_threads(before)
     return rows
-
-
-_RUNS: dict[str, Any] = {
-    "gather": kernels.gather_all,
-    "chain": kernels.chain_all,
-    "load": kernels.load_all,
-}
 
 
 def _enough(

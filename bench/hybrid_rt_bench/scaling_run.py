@@ -12,7 +12,7 @@ import numpy as np
 
 import hybrid_rt as hrt
 from hybrid_rt_bench import env, scaling_cell, stats
-from hybrid_rt_bench.plan import NothingToRunError, Plan, find_scene
+from hybrid_rt_bench.plan import NothingToRunError, Plan, find_scene, size_text
 from hybrid_rt_bench.progress import Reporter
 from hybrid_rt_bench.results import RunWriter
 from hybrid_rt_bench.run import Outcome, carry_out, warn
@@ -258,7 +258,7 @@ def _cells(
     resolutions = sorted(set(series.resolutions), key=lambda r: r.width * r.height)
     if series.axis == "triangles":
         return [
-            PlannedCell(size, _power(size), task(size, resolutions[0], threads))
+            PlannedCell(size, size_text(size), task(size, resolutions[0], threads))
             for size in series.triangles
         ]
     if series.axis == "pixels":
@@ -402,10 +402,6 @@ def _thread_counts(most: int) -> list[int]:
         counts.add(round(step))
         step *= 2 ** (1 / 3)
     return sorted(counts)
-
-
-def _power(size: int) -> str:
-    return f"2^{size.bit_length() - 1}" if size & (size - 1) == 0 else str(size)
 
 
 def _duration(seconds: float) -> str:

@@ -6,12 +6,13 @@ import pandas as pd
 
 from hybrid_rt_bench.pooling import POINT, Pooled, pools
 from hybrid_rt_bench.report.error_tables import (
+    BOUND_NOTES,
     EMBREE,
     STRICT,
+    STRICT_NOTE,
     asked_points,
     cells_text,
     count_text,
-    name_of,
     share,
     speedup_text,
     table_counts,
@@ -43,15 +44,10 @@ def tables(run: RunData) -> list[Table]:
         f"{cells_text(rows)}. Each row differs from the first, the default, by what it says. Lists "
         "of k primitives a pixel are a depth buffer of k layers; cells of n x n pixels share a "
         "list; guard x2 has lists for a view twice as wide and high as the screen.",
-        "Wrong: false hits, false misses and wrong primitives together, among the rays that the "
-        "screen answers [95 % upper bound of their rate; 3 / N if none was seen].",
+        STRICT_NOTE,
         "Speed-up: T(strongest Embree, every ray) / T(march + compaction + fallback + merge), run "
         "side by side; geometric mean over cells of the median over rounds [95 % interval].",
-        "If the march took no time: the speed-up without T(march) in it, the most that any march "
-        "which answers the same rays could reach.",
-        "May cost: the march at which the hybrid would break even, (T(strongest Embree, every ray) "
-        "- T(compaction) - T(fallback) - T(merge)) / rays, of the same runs. Below 0, what is left "
-        "for Embree takes longer than all rays did: no march is fast enough.",
+        *BOUND_NOTES,
         "Data: made for the march once a view (pyramid, and lists if any), not in the speed-up.",
     ]
     others = [table_counts(run), table_status(run)]
@@ -68,7 +64,11 @@ def tables(run: RunData) -> list[Table]:
 def _rows(rows: pd.DataFrame, samples: pd.DataFrame) -> list[list[str]]:
     found = pools(rows, POINT)
     base = next(iter(found.values())).nanoseconds("march_ms")
-    return [_row(name_of(*key), pooled, samples, base) for key, pooled in found.items()]
+    return [_row(_name(*key), pooled, samples, base) for key, pooled in found.items()]
+
+
+def _name(technique: str, point: str) -> str:
+    return point if technique == "certified" else technique
 
 
 def _row(name: str, pooled: Pooled, samples: pd.DataFrame, base: float) -> list[str]:

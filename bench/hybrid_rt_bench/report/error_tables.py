@@ -15,6 +15,19 @@ EMBREE = "embree"
 STRICT = (*WRONG, "wrong_primitive")
 """What a certified answer never is."""
 
+STRICT_NOTE = (
+    "Wrong: false hits, false misses and wrong primitives together, among the rays that the "
+    "screen answers [95 % upper bound of their rate; 3 / N if none was seen]."
+)
+BOUND_NOTES = (
+    "If the march took no time: the speed-up without T(march) in it, the most that any march "
+    "which answers the same rays could reach.",
+    "May cost: the march at which the hybrid would break even, (T(strongest Embree, every ray) "
+    "- T(compaction) - T(fallback) - T(merge)) / rays, of the same runs. Below 0, what is left "
+    "for Embree takes longer than all rays did: no march is fast enough.",
+)
+"""What `Pooled.free_march` and `Pooled.may_cost` are, under the tables that show them."""
+
 
 def all_tables(run: RunData) -> list[Table]:
     """Return every table of the run, in the order of reading."""
@@ -330,11 +343,6 @@ def march_rate(technique: str, pooled: Pooled) -> float:
 def point_name(technique: str, point: str) -> str:
     """Return what one of the defaults is called; Embree has two."""
     return f"{technique}, {point}" if technique == EMBREE else technique
-
-
-def name_of(technique: str, point: str) -> str:
-    """Return what a point is called where those of mode "certified" stand by themselves."""
-    return point if technique == "certified" else technique
 
 
 def full_name(technique: str, point: str, pooled: Pooled) -> str:

@@ -6,8 +6,10 @@ import pandas as pd
 
 from hybrid_rt_bench.pooling import POINT, WRONG, Pooled, pools
 from hybrid_rt_bench.report.error_tables import (
+    BOUND_NOTES,
     EMBREE,
     STRICT,
+    STRICT_NOTE,
     asked_points,
     cells_text,
     count_text,
@@ -66,16 +68,11 @@ def table_goal(run: RunData) -> Table:
         f"{cells_text(rows)}. Alpha and counts of all cameras together. At its cheapest: "
         + "; ".join(dict.fromkeys(rows.loc[~rows["default"], "point"]))
         + ".",
-        "Wrong: false hits, false misses and wrong primitives together, among the rays that the "
-        "screen answers [95 % upper bound of their rate; 3 / N if none was seen].",
+        STRICT_NOTE,
         "March / Embree: T(march) / T(strongest Embree, every ray). Speed-up: T(strongest Embree, "
         "every ray) / T(march + compaction + fallback + merge). Both run side by side; geometric "
         "mean over cameras of the median over rounds [95 % bootstrap interval over rounds].",
-        "If the march took no time: the speed-up without T(march) in it, the most that any march "
-        "which answers the same rays could reach.",
-        "May cost: the march at which the hybrid would break even, (T(strongest Embree, every ray) "
-        "- T(compaction) - T(fallback) - T(merge)) / rays, of the same runs. Below 0, what is left "
-        "for Embree takes longer than all rays did: no march is fast enough.",
+        *BOUND_NOTES,
         "Data: lists and pyramid, made once a view, not in the speed-up.",
     ]
     return table

@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from hybrid_rt_bench.report.table import Table, interval, number
+from hybrid_rt_bench.report.table import Table, interval, number, threads_text
 from hybrid_rt_bench.results import RunData
 from hybrid_rt_bench.roofline import STRUCTURES, far_gathers_ns, far_ns, near_gathers_ns, ns_element
 
@@ -145,8 +145,8 @@ def gathers(run: RunData) -> Table:
     table = Table(
         "Gathers",
         ["", "working set, MiB", "numbers a ray", "places a ray",
-         *(f"ns a number, {_threads(n)}" for n in counts),
-         *(f"ns a ray, {_threads(n)}" for n in counts)],
+         *(f"ns a number, {threads_text(n)}" for n in counts),
+         *(f"ns a ray, {threads_text(n)}" for n in counts)],
         detail=True,
     )  # fmt: skip
     rates = run.meta["rates"]
@@ -179,9 +179,9 @@ def machine(run: RunData) -> Table:
     counts = sorted(int(n) for n in rates.threads.unique())
     table = Table(
         "How fast the machine reads",
-        ["table, KiB", *(f"gathers, G numbers/s, {_threads(n)}" for n in counts),
-         *(f"latency of a vector, ns, {_threads(n)}" for n in counts),
-         *(f"loads, GB/s, {_threads(n)}" for n in counts)],
+        ["table, KiB", *(f"gathers, G numbers/s, {threads_text(n)}" for n in counts),
+         *(f"latency of a vector, ns, {threads_text(n)}" for n in counts),
+         *(f"loads, GB/s, {threads_text(n)}" for n in counts)],
     )  # fmt: skip
     for size, part in rates.groupby("bytes"):
         by: Any = part.set_index(["kind", "threads"])
@@ -216,7 +216,9 @@ def view(run: RunData, row: Any) -> str:
 
 
 def _groups(run: RunData) -> list[tuple[str, pd.DataFrame]]:
-    return [(_threads(int(str(threads))), rows) for threads, rows in run.results.groupby("threads")]
+    return [
+        (threads_text(int(str(threads))), rows) for threads, rows in run.results.groupby("threads")
+    ]
 
 
 def _once(run: RunData) -> pd.DataFrame:
@@ -227,7 +229,3 @@ def _once(run: RunData) -> pd.DataFrame:
 
 def _rows(rows: pd.DataFrame) -> list[Any]:
     return [row for _, row in rows.iterrows()]
-
-
-def _threads(count: int) -> str:
-    return f"{count} thread{'s' if count != 1 else ''}"

@@ -14,7 +14,7 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 
 from hybrid_rt_bench.report.figures import BLUE, GREEN, GREY, ORANGE, SKY, STYLE
 from hybrid_rt_bench.report.roofline import view
-from hybrid_rt_bench.report.table import number
+from hybrid_rt_bench.report.table import number, threads_text
 from hybrid_rt_bench.results import RunData
 from hybrid_rt_bench.roofline import STRUCTURES, far_gathers_ns, near_gathers_ns
 
@@ -49,10 +49,9 @@ def gather_rate(run: RunData) -> Figure:
         for threads, colour in zip(counts, (BLUE, ORANGE), strict=False):
             for kind, style, marker in LINES:
                 part = rates[(rates.kind == kind) & (rates.threads == threads)]
-                plural = "s" if threads != 1 else ""
                 ax.plot(
                     part.bytes / 1024, 1 / part.ns_element, style, color=colour, marker=marker,
-                    ms=4.5, label=f"{threads} thread{plural}, {NAMES[kind]}",
+                    ms=4.5, label=f"{threads_text(threads)}, {NAMES[kind]}",
                 )  # fmt: skip
         _mark(ax, run.results[run.results.scene == scene].iloc[0], rates)
         ax.set(title=scene, xscale="log", yscale="log", xlabel="working set")
@@ -102,8 +101,7 @@ def march_budget(run: RunData) -> Figure:
     axes: Any = figure.subplots(1, len(groups), sharey=True, squeeze=False)[0]
     for ax, (threads, rows) in zip(axes, groups, strict=True):
         _bars(ax, run, rows)
-        plural = "s" if threads != 1 else ""
-        ax.set_title(f"{threads} thread{plural}")
+        ax.set_title(threads_text(int(str(threads))))
     low = min(0.0, float(run.results.budget_ns.min()))
     high = float(run.results[["march_ns", "embree_ns"]].to_numpy().max())
     axes[0].set(ylabel="ns a ray", ylim=(1.1 * low, 1.08 * high))

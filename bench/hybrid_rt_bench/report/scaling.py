@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from hybrid_rt_bench import exponents, stats
-from hybrid_rt_bench.report.table import Table, interval, number
+from hybrid_rt_bench.report.table import Table, interval, number, threads_text
 from hybrid_rt_bench.results import HYBRID_STAGES, RunData
 from hybrid_rt_bench.scaling_stages import A_RAY, Key, name_of, ordered
 
@@ -63,7 +63,7 @@ def fixed(part: pd.DataFrame) -> str:
     if row.axis != "pixels":
         words.append(f"{row.width}x{row.height}")
     if row.axis != "threads":
-        words.append(f"{row.threads} thread{'s' if row.threads != 1 else ''}")
+        words.append(threads_text(row.threads))
     return ", ".join(words)
 
 

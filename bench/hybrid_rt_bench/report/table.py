@@ -83,6 +83,11 @@ def number(value: float, digits: int = 3) -> str:
     return f"{round(value, decimals):.{max(0, decimals)}f}"
 
 
+def threads_text(count: int) -> str:
+    """Return a number of threads in words."""
+    return f"{count} thread{'s' if count != 1 else ''}"
+
+
 def interval(value: float, low: float, high: float, digits: int = 3) -> str:
     """Return ``value [low, high]``."""
     return f"{number(value, digits)} [{number(low, digits)}, {number(high, digits)}]"

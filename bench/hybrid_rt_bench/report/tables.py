@@ -10,7 +10,7 @@ import pandas as pd
 
 from hybrid_rt_bench import stats, summary
 from hybrid_rt_bench.report import paper
-from hybrid_rt_bench.report.table import Table, interval, number
+from hybrid_rt_bench.report.table import Table, interval, number, threads_text
 from hybrid_rt_bench.results import STAGES, RunData
 
 Samples = dict[str, Any]
@@ -377,5 +377,5 @@ def _largest(run: RunData) -> pd.DataFrame:
 
 
 def _threads(run: RunData) -> str:
-    n = run.meta["environment"]["threads"]
-    return f"{n} thread{'s' if n != 1 else ''}, {run.meta['environment']['cpu']}"
+    environment = run.meta["environment"]
+    return f"{threads_text(environment['threads'])}, {environment['cpu']}"
