@@ -43,6 +43,7 @@ from numba import prange
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._borrow import borrowed, keep
 from hybrid_rt.kernels._jit import inlined, parallel_kernel
+from hybrid_rt.kernels._order import BUCKETS, near_first
 from hybrid_rt.kernels._queue import fetch_add
 from hybrid_rt.kernels.lists_bins import LANES, SLACK, TILE, TILE_BITS, round_up, row
 
@@ -74,8 +75,6 @@ WHOLE = 8
 """Length of lists that are written a row of a block at a time."""
 LINE = WHOLE * BLOCK_X
 
-BUCKETS = 256
-"""Depths that a tile's faces are sorted by, eight to each halving."""
 FULL = np.int32(2**31 - 1)
 INVERSE = np.array([0] + [65536 // n + 1 for n in range(1, LANES + 1)], np.int32)
 """ t * INVERSE[n] >> 16 is t // n for t < LANES."""
@@ -400,28 +399,9 @@ def draw(
 
 
 @inlined
-def near_first(bins, start, end, records, order, heads):
-    """Put bins start..end-1 into `order`, roughly nearest first.
-
-    records: see `hybrid_rt.kernels.lists_bins.cull_and_count`; heads (BUCKETS + 1,) int32 is
-    scratch. The lists do not depend on the order; what is near hides what comes later.
-    """
-    heads[:] = 0
-    for at in range(start, end):
-        heads[bucket(records[bins[at], 1] >> 32) + 1] += 1
-    for b in range(BUCKETS):
-        heads[b + 1] += heads[b]
-    for at in range(start, end):
-        s = bins[at]
-        b = bucket(records[s, 1] >> 32)
-        order[heads[b]] = s
-        heads[b] += 1
-
-
-@inlined
-def bucket(bits):
-    """Return a number that is smaller for nearer depths, given as bits of a float32."""
-    return min(max((0x3F8 - (bits >> 20)), 0), BUCKETS - 1)
+def depth_bits(records, record):
+    """Return a face's nearest depth as the bits of a float32; see `lists_bins.cull_and_count`."""
+    return records[record, 1] >> 32
 
 
 @inlined
@@ -543,7 +523,7 @@ def fill_lists(
                 else:
                     filled[:] = length + 1
                     read_tile(left, top, right, bottom, prim_id, nearest, rest, words, floats)
-                near_first(bins, start, end, records, order, heads)
+                near_first(bins, start, end, depth_bits, records, order, heads)
                 at = np.int64(0)
                 while at < end - start:
                     count = 0

@@ -12,6 +12,7 @@ from numba import prange
 
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._jit import inlined, parallel_kernel
+from hybrid_rt.kernels._order import BUCKETS, near_first
 from hybrid_rt.kernels._queue import fetch_add
 from hybrid_rt.kernels.clip import HALF, SUBPIXEL_BITS
 from hybrid_rt.kernels.raster import (
@@ -34,8 +35,6 @@ OLD = (1 << 29) - 1
 """Rank of what an earlier batch has drawn. Record r has OLD - 1 - r: the smallest wins a tie."""
 LANES = 8
 LARGEST = float(np.finfo(np.float32).max)
-BUCKETS = 256
-"""Depths that a tile's records are sorted by, eight to each halving."""
 REVISION = 16
 """Records after which a tile finds out again behind which depth nothing can be seen."""
 
@@ -174,28 +173,9 @@ def farthest_of(keys, columns, rows, lowest_key):
 
 
 @inlined
-def bucket(depth):
-    """Return a number that is smaller for nearer depths."""
-    bits = np.int64(np.float32(depth).view(np.int32))
-    return min(max(0x3F8 - (bits >> 20), 0), BUCKETS - 1)
-
-
-@inlined
-def near_first(bins, start, end, floats, order, heads):
-    """Put the records of bins start..end-1 into `order`, roughly nearest first.
-
-    heads (BUCKETS + 1,) int32 is scratch. What is drawn does not depend on the order; what is near
-    hides what comes later.
-    """
-    heads[:] = 0
-    for at in range(start, end):
-        heads[bucket(floats[bins[at], 4]) + 1] += 1
-    for b in range(BUCKETS):
-        heads[b + 1] += heads[b]
-    for at in range(start, end):
-        b = bucket(floats[bins[at], 4])
-        order[heads[b]] = bins[at]
-        heads[b] += 1
+def depth_bits(floats, record):
+    """Return a record's nearest depth as the bits of a float32."""
+    return np.int64(np.float32(floats[record, 4]).view(np.int32))
 
 
 @inlined
@@ -257,7 +237,7 @@ def draw_tiles(
                             old = depth[top + j, left + i]
                             if old > 0.0:
                                 keys[j * STRIDE + i] = pack(old, OLD)
-                near_first(bins, start, end, floats, order, heads)
+                near_first(bins, start, end, depth_bits, floats, order, heads)
                 hidden = np.float32(0.0)
                 until = REVISION
                 for at in range(end - start):
