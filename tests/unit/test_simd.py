@@ -43,6 +43,7 @@ from hybrid_rt.kernels.simd import (
     iota,
     load,
     load_masked,
+    load_triples,
     mask,
     mask_of_bits,
     maximum,
@@ -56,6 +57,7 @@ from hybrid_rt.kernels.simd import (
     sqrt,
     store,
     store_masked,
+    store_triples,
     to_f32,
     to_f64,
     to_i32,
@@ -483,6 +485,46 @@ def test_gathers_and_scatters(dtype, index):
         assert_same(out, wanted)
 
 
+@pytest.mark.parametrize("lanes", [4, 8, 16])
+@pytest.mark.parametrize("dtype", FLOATS + INTS)
+def test_triples(dtype, lanes):
+    @compiled
+    def run(a, i, n, columns, out, m):
+        x, y, z = load_triples(a, i, n, lanes)
+        store(columns, 0, x)
+        store(columns, lanes, y)
+        store(columns, 2 * lanes, z)
+        store_triples(out, i, x, y, z, load(m, 0, lanes))
+
+    a = elements(dtype, (lanes + 3, 3), 15)
+    a.flags.writeable = False
+    rng = np.random.default_rng(16)
+    for n in (-1, 0, 1, 2, lanes // 2 + 1, lanes - 1, lanes, lanes + 1, 1 << 40):
+        for i in (0, 4):
+            columns = elements(dtype, 3 * lanes, 17)
+            out = elements(dtype, a.size, 18)
+            wanted, written = np.zeros((lanes, 3), dtype), out.copy()
+            m = rng.random(lanes) < 0.7
+            run(a, i, n, columns, out, m)
+            read = min(max(n, 0), lanes)
+            wanted[:read] = a.reshape(-1)[i : i + 3 * read].reshape(-1, 3)
+            assert_same(columns.reshape(3, lanes), wanted.T)
+            written[i : i + 3 * lanes].reshape(-1, 3)[m] = wanted[m]
+            assert_same(out, written)
+
+
+def before_a_closed_page(dtype):
+    """Return an array that ends where a page begins that may not be touched."""
+    page = mmap.PAGESIZE
+    region = mmap.mmap(-1, 2 * page)
+    libc = ctypes.CDLL(None, use_errno=True)
+    start = ctypes.addressof(ctypes.c_char.from_buffer(region))
+    assert libc.mprotect(ctypes.c_void_p(start + page), ctypes.c_size_t(page), 0) == 0
+    a = np.frombuffer(region, dtype, page // np.dtype(dtype).itemsize)
+    a[:] = elements(dtype, a.size, 15)
+    return a
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="pages are closed by Linux's mprotect")
 @pytest.mark.parametrize("dtype", ELEMENTS)
 def test_masked_lanes_do_not_touch_a_closed_page(dtype):
@@ -500,13 +542,7 @@ def test_masked_lanes_do_not_touch_a_closed_page(dtype):
         store_masked(a, i, v, live)
         scatter(a, iota() + i, w, live)
 
-    page = mmap.PAGESIZE
-    region = mmap.mmap(-1, 2 * page)
-    libc = ctypes.CDLL(None, use_errno=True)
-    start = ctypes.addressof(ctypes.c_char.from_buffer(region))
-    assert libc.mprotect(ctypes.c_void_p(start + page), ctypes.c_size_t(page), 0) == 0
-    a = np.frombuffer(region, dtype, page // np.dtype(dtype).itemsize)
-    a[:] = elements(dtype, a.size, 15)
+    a = before_a_closed_page(dtype)
     for n in range(WIDTH):
         out, ones = np.empty((2, WIDTH), ELEMENTS[dtype])
         before = a.copy()
@@ -514,6 +550,24 @@ def test_masked_lanes_do_not_touch_a_closed_page(dtype):
         assert_same(out[:n], a[a.size - n :].astype(out.dtype))
         assert not out[n:].any()
         assert_same(ones, np.append(out[:n], np.full(WIDTH - n, one, out.dtype)))
+        assert_same(a, before)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="pages are closed by Linux's mprotect")
+@pytest.mark.parametrize("dtype", FLOATS + INTS)
+def test_triples_do_not_touch_a_closed_page(dtype):
+    @compiled
+    def run(a, i, n, out):
+        x, y, z = load_triples(a, i, n)
+        store(out, 0, x + y + z)
+        store_triples(a, i, x, y, z, first(n))
+
+    a = before_a_closed_page(dtype)
+    for n in range(WIDTH):
+        out, before = np.empty(WIDTH, dtype), a.copy()
+        run(a, a.size - 3 * n, n, out)
+        assert_same(out[:n], a[a.size - 3 * n :].reshape(n, 3).sum(axis=1, dtype=dtype))
+        assert not out[n:].any()
         assert_same(a, before)
 
 

@@ -61,6 +61,7 @@ from .make import f32, f64, first, i32, i64, iota, mask, mask_of_bits
 from .memory import gather, load, load_masked, scatter, store, store_masked
 from .packing import compress, expand
 from .together import interleave, part
+from .triples import load_triples, store_triples
 
 __all__ = [
     "AVX512",
@@ -89,6 +90,7 @@ __all__ = [
     "iota",
     "load",
     "load_masked",
+    "load_triples",
     "lowest",
     "mask",
     "mask_of_bits",
@@ -103,6 +105,7 @@ __all__ = [
     "sqrt",
     "store",
     "store_masked",
+    "store_triples",
     "to_f32",
     "to_f64",
     "to_i32",
