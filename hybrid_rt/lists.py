@@ -71,7 +71,7 @@ def primitive_lists(
                 continue
             tile_start = np.empty(tiles + 1, np.int32)
             prefix_sums(n_survivors, counts, np.empty(chunks + 1, np.int32), tile_start)
-            bins = np.empty(entries, np.int32)
+            bins = np.empty(entries, np.int64)
             bin_kernels.fill_bins(records, n_survivors, tiles_x, workers, chunk, counts, bins)
             kernels.fill_lists(
                 scene.corners.reshape(-1), tile_start, bins, records, eye, m, frame, near, width,

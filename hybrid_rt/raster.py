@@ -99,19 +99,26 @@ def rasterize(
     _check.instance("lists_camera", view, Camera)
     if lists_camera is not None and length == 0:
         raise ArgumentError("lists_camera", "None where lists is 0", "a Camera")
-    shape = (camera.height, camera.width)
-    depth, ddx, ddy = (np.empty(shape, np.float32) for _ in range(3))
-    prim_id = np.empty(shape, np.int32)
-    with _threads.limited(threads) as lanes:
-        _draw(scene, camera, lanes, depth, ddx, ddy, prim_id)
+    depth, ddx, ddy, prim_id = _images(camera.height, camera.width)
+    with _threads.limited(threads) as workers:
+        _draw(scene, camera, workers, depth, ddx, ddy, prim_id)
         if derivatives == "quad":
             tile_kernels.quad_differences(depth, ddx, ddy)
     found = primitive_lists(scene, view, length, threads) if length else None
     return GBuffer(depth, ddx, ddy, prim_id, scene, camera, found)
 
 
+def _images(height: int, width: int) -> tuple[F32, F32, F32, I32]:
+    """Return room for depth, ddx, ddy and prim_id: one block, which few pages need be found for."""
+    n = 4 * height * width
+    raw = np.empty(n + 16, np.float32)
+    start = -raw.ctypes.data % 64 // 4
+    depth, ddx, ddy, last = raw[start : start + n].reshape(4, height, width)
+    return depth, ddx, ddy, last.view(np.int32)
+
+
 def _draw(
-    scene: Scene, camera: Camera, lanes: int, depth: F32, ddx: F32, ddy: F32, prim_id: I32
+    scene: Scene, camera: Camera, workers: int, depth: F32, ddx: F32, ddy: F32, prim_id: I32
 ) -> None:
     """Draw all faces over the images, a batch at a time."""
     vertices, faces = scene.vertices, scene.faces
@@ -119,9 +126,8 @@ def _draw(
     eye = np.array(camera.eye, np.float64)
     m = camera.pixel_from_world
     frame = camera.world_from_pixel
-    xy = np.empty((len(vertices), 2), np.int32)
-    out = np.empty(len(vertices), np.uint8)
-    clip_kernels.transform_vertices(vertices, eye, m, width, height, near, xy, out)
+    xy = np.empty(len(vertices), np.int64)
+    clip_kernels.transform_vertices(vertices, eye, m, width, height, near, xy)
 
     tiles_x = -(-width // kernels.TILE)
     tiles = tiles_x * -(-height // kernels.TILE)
@@ -136,8 +142,8 @@ def _draw(
         n_records = np.empty(chunks, np.int32)
         counts = np.empty((chunks, tiles), np.int32)
         kernels.cull_and_count(
-            vertices, faces, first, last, eye, m, width, height, near, xy, out, tiles_x,
-            lanes, chunk, survivors, n_survivors, n_records, counts,
+            vertices, faces, first, last, eye, m, width, height, near, xy, tiles_x,
+            workers, chunk, survivors, n_survivors, n_records, counts,
         )  # fmt: skip
         entries = int(counts.sum(dtype=np.int64))
         if entries > BATCH_ENTRIES and size > 1:
@@ -148,14 +154,14 @@ def _draw(
         kernels.prefix_sums(n_records, counts, record_start, tile_start)
         records = int(record_start[-1])
         ints = np.empty((records, kernels.RECORD_INTS), np.int32)
-        floats = np.empty((records, kernels.RECORD_FLOATS), np.float64)
-        bins = np.empty(entries, np.int32)
+        planes = ints.view(np.float64)
+        bins = np.empty(entries, np.int64)
         kernels.fill_bins(
             vertices, faces, first, eye, m, frame, width, height, near, xy, tiles_x,
-            lanes, chunk, survivors, n_survivors, record_start, counts, ints, floats, bins,
+            workers, chunk, survivors, n_survivors, record_start, counts, ints, planes, bins,
         )  # fmt: skip
         tile_kernels.draw_tiles(
-            tile_start, bins, ints, floats, tiles_x, 0.5 * width, 0.5 * height, lanes,
+            tile_start, bins, ints, planes, tiles_x, 0.5 * width, 0.5 * height, workers,
             first == 0, depth, ddx, ddy, prim_id,
         )  # fmt: skip
         first = last

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
+from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
 
 SUBPIXEL_BITS = 8
@@ -21,11 +22,10 @@ GUARD_LOW = -16384.0
 GUARD_HIGH = 49152.0
 """Largest one; the screen itself ends at 32768."""
 
-OUT_LEFT, OUT_RIGHT, OUT_TOP, OUT_BOTTOM = 1, 2, 4, 8
-OUT_NEAR = 16
-OUT_GUARD = 32
-OUT_SCREEN = OUT_LEFT | OUT_RIGHT | OUT_TOP | OUT_BOTTOM | OUT_NEAR
-NEEDS_CLIP = OUT_NEAR | OUT_GUARD
+OUT_LEFT, OUT_RIGHT, OUT_TOP, OUT_BOTTOM, OUT_NEAR = 1, 2, 4, 8, 16
+CLIPPED = -(1 << 31)
+"""In place of a coordinate: the vertex is one that triangles are to be clipped at."""
+LANES = 8
 
 MAX_CORNERS = 8
 """A triangle cut by five planes has at most eight corners."""
@@ -51,41 +51,34 @@ def snap(x):
 
 
 @parallel_kernel
-def transform_vertices(vertices, eye, m, width, height, near, xy, out):
-    """Snap all vertices: (V, 3) float32 world -> xy (V, 2) int32, out (V,) uint8 of OUT_ bits.
+def transform_vertices(vertices, eye, m, width, height, near, xy):
+    """Snap all vertices: (V, 3) float32 world -> xy (V,) int64, y above x.
 
-    `xy` is meaningless where `out` has a bit of NEEDS_CLIP.
+    A vertex nearer than the near plane or beyond the guard band has `CLIPPED` for x and, for y,
+    the sides of the screen that it lies outside of.
     """
-    w = np.float64(width)
-    h = np.float64(height)
-    for i in prange(len(vertices)):
-        q0, q1, q2 = to_screen(vertices[i, 0], vertices[i, 1], vertices[i, 2], eye, m)
-        bits = 0
-        # Tests in homogeneous form hold on both sides of the eye's plane.
-        if q0 < 0.0:
-            bits |= OUT_LEFT
-        if q0 > w * q2:
-            bits |= OUT_RIGHT
-        if q1 < 0.0:
-            bits |= OUT_TOP
-        if q1 > h * q2:
-            bits |= OUT_BOTTOM
+    n = len(vertices)
+    w, h = np.float64(width), np.float64(height)
+    for group in prange((n + LANES - 1) // LANES):
+        at = group * LANES
+        live = simd.first(n - at, LANES)
+        px, py, pz = simd.load_triples(vertices, 3 * at, n - at, LANES)
+        r0, r1, r2 = simd.to_f64(px) - eye[0], simd.to_f64(py) - eye[1], simd.to_f64(pz) - eye[2]
+        q0 = m[0, 0] * r0 + m[0, 1] * r1 + m[0, 2] * r2
+        q1 = m[1, 0] * r0 + m[1, 1] * r1 + m[1, 2] * r2
+        q2 = m[2, 0] * r0 + m[2, 1] * r1 + m[2, 2] * r2
         # Written so that a NaN, which finite input cannot make, would be clipped away.
-        if not q2 >= near:
-            bits |= OUT_NEAR
-            xy[i, 0] = 0
-            xy[i, 1] = 0
-        else:
-            x = q0 / q2
-            y = q1 / q2
-            if x >= GUARD_LOW and x <= GUARD_HIGH and y >= GUARD_LOW and y <= GUARD_HIGH:
-                xy[i, 0] = snap(x)
-                xy[i, 1] = snap(y)
-            else:
-                bits |= OUT_GUARD
-                xy[i, 0] = 0
-                xy[i, 1] = 0
-        out[i] = bits
+        front = q2 >= near
+        x, y = q0 / q2, q1 / q2
+        plain = front & (x >= GUARD_LOW) & (x <= GUARD_HIGH) & (y >= GUARD_LOW) & (y <= GUARD_HIGH)
+        # Tests in homogeneous form hold on both sides of the eye's plane.
+        sides = simd.to_i64(q0 < 0.0) | simd.to_i64(q0 > w * q2) << 1
+        sides = sides | simd.to_i64(q1 < 0.0) << 2 | simd.to_i64(q1 > h * q2) << 3
+        sides = sides | simd.to_i64(~front) << 4
+        sx = simd.to_i64(simd.floor(x * ONE + 0.5)) & 0xFFFFFFFF
+        sy = simd.to_i64(simd.floor(y * ONE + 0.5))
+        packed = simd.select(plain, sx | sy << 32, sides << 32 | np.int64(CLIPPED & 0xFFFFFFFF))
+        simd.store_masked(xy, at, packed, live)
 
 
 @inlined

@@ -19,6 +19,7 @@ from llvmlite import ir
 from numba import prange, types
 from numba.extending import intrinsic
 
+from hybrid_rt.kernels._aligned import aligned
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
 from hybrid_rt.kernels._queue import fetch_add
 
@@ -55,14 +56,6 @@ def _generator_of(count):
         return context.get_dummy_value()
 
     return generate
-
-
-@inlined
-def _aligned(words):
-    """Return `words` float32 that start at a multiple of 64 bytes, as packets of 16 must."""
-    raw = np.zeros(words + 16, np.float32)
-    start = (-raw.ctypes.data % 64) // 4
-    return raw[start : start + words]
 
 
 @inlined
@@ -103,13 +96,14 @@ def _packet(width):
 
     What no ray changes is set here once: time and id 0, all of the mask, nothing hit.
     """
-    packet = _aligned(FIELDS * width)
+    packet = aligned(FIELDS * width // 2 + 1).view(np.float32)  # packets of 16 must be
+    packet[:] = 0.0
     words = packet.view(np.int32)
     for k in range(width):
         words[9 * width + k] = -1
         for field in range(17, SCALE):
             words[field * width + k] = -1
-    return packet, words, _aligned(width).view(np.int32)
+    return packet, words, aligned(width // 2 + 1).view(np.int32)
 
 
 @inlined

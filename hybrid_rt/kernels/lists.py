@@ -41,6 +41,7 @@ import numpy as np
 from numba import prange
 
 from hybrid_rt.kernels import simd
+from hybrid_rt.kernels._aligned import aligned
 from hybrid_rt.kernels._borrow import borrowed, keep
 from hybrid_rt.kernels._jit import inlined, parallel_kernel
 from hybrid_rt.kernels._order import BUCKETS, near_first
@@ -399,12 +400,6 @@ def draw(
 
 
 @inlined
-def depth_bits(records, record):
-    """Return a face's nearest depth as the bits of a float32; see `lists_bins.cull_and_count`."""
-    return records[record, 1] >> 32
-
-
-@inlined
 def read_tile(left, top, right, bottom, prim_id, nearest, rest, words, floats):
     """Read a tile's lists, as earlier batches have left them."""
     length = prim_id.shape[2]
@@ -467,14 +462,6 @@ def write_tile(left, top, right, bottom, keys, words, floats, filled, prim_id, n
                     rest[j, i] = floats[2 * (at + length * LANES) + 1]
 
 
-@inlined
-def aligned(n):
-    """Return n int64 that start at a multiple of 64 bytes, so that vectors stay in cache lines."""
-    raw = np.empty(n + 8, np.int64)
-    start = (-raw.ctypes.data % 64) // 8
-    return raw[start : start + n]
-
-
 @parallel_kernel
 def fill_lists(
     corners, tile_start, bins, records, eye, m, frame, near, width, height, margin, tiles_x,
@@ -507,7 +494,7 @@ def fill_lists(
         farthest = borrowed(owner2)
         owner3 = np.empty(BLOCKS, np.int64)
         filled = borrowed(owner3)
-        order = np.empty(most, np.int32)
+        order = np.empty(most, np.int64)
         heads = np.empty(BUCKETS + 1, np.int32)
         tile = fetch_add(taken.ctypes.data, 1)
         while tile < tiles:
@@ -523,12 +510,12 @@ def fill_lists(
                 else:
                     filled[:] = length + 1
                     read_tile(left, top, right, bottom, prim_id, nearest, rest, words, floats)
-                near_first(bins, start, end, depth_bits, records, order, heads)
+                near_first(bins, start, end, order, heads)
                 at = np.int64(0)
                 while at < end - start:
                     count = 0
                     while count < LANES and at < end - start:
-                        s = order[at]
+                        s = order[at] & 0xFFFFFFFF
                         at += 1
                         span, word = records[s, 0], records[s, 1]
                         i0, j0, i1, j1 = within(span, left, top, right, bottom)

@@ -12,6 +12,7 @@ from numba import prange
 
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._jit import inlined, parallel_kernel
+from hybrid_rt.kernels._order import entry
 from hybrid_rt.kernels._queue import fetch_add
 
 TILE_BITS = 5
@@ -70,11 +71,8 @@ def box_vertices(vertices, eye, m, near, width, height, margin, boxes, flags, ne
     for group in prange((n + LANES - 1) // LANES):
         at = group * LANES
         live = simd.first(n - at, LANES)
-        here = vertices[3 * at : min(3 * (at + LANES), 3 * n)]
-        index = simd.iota(LANES) * np.int32(3)
-        x = simd.to_f64(simd.gather(here, index, live, np.float32(0.0))) - eye[0]
-        y = simd.to_f64(simd.gather(here, index + np.int32(1), live, np.float32(0.0))) - eye[1]
-        z = simd.to_f64(simd.gather(here, index + np.int32(2), live, np.float32(0.0))) - eye[2]
+        px, py, pz = simd.load_triples(vertices, 3 * at, n - at, LANES)
+        x, y, z = simd.to_f64(px) - eye[0], simd.to_f64(py) - eye[1], simd.to_f64(pz) - eye[2]
         q0, s0 = row(m, 0, x, y, z)
         q1, s1 = row(m, 1, x, y, z)
         q2, s2 = row(m, 2, x, y, z)
@@ -160,7 +158,7 @@ def fill_bins(records, n_survivors, tiles_x, workers, chunk, cursors, bins):
     """Note the survivors, by their places, in every tile of their box.
 
     cursors (chunks, tiles) int32, made of the counts by `hybrid_rt.kernels.raster.prefix_sums`, are
-    advanced; bins (entries,) int32.
+    advanced; bins (entries,) int64, see `hybrid_rt.kernels._order`.
     """
     taken = np.zeros(1, np.int64)
     for _ in prange(workers):
@@ -174,6 +172,6 @@ def fill_bins(records, n_survivors, tiles_x, workers, chunk, cursors, bins):
                 for v in range(v0, v1 + 1):
                     for u in range(u0, u1 + 1):
                         tile = v * tiles_x + u
-                        bins[cursor[tile]] = s
+                        bins[cursor[tile]] = entry(records[s, 1] >> 32, s)
                         cursor[tile] += 1
             c = fetch_add(taken.ctypes.data, 1)

@@ -2,12 +2,12 @@
 
 Coverage is decided by integer edge functions of vertices snapped to 1/256 pixel, at pixel centres,
 with the top-left rule: two triangles at a shared edge never both cover a centre and never leave one
-out. Depth comes from the unsnapped plane (see `plane_of`).
+out. Depth comes from the unsnapped plane (see `write_planes`).
 
-Triangles go through in batches of consecutive faces, a batch in chunks, a chunk on one thread.
-Each of `lanes` threads takes chunks and tiles in turn (k, k + lanes ...), which spreads the visible
-part of a scene evenly. Every triangle that may cover a pixel gets a *record*; records are in the
-order of prim_id, so that their numbers can decide ties of depth.
+Triangles go through in batches of consecutive faces, a batch in chunks, a chunk on one thread,
+LANES faces at a time. Each of `workers` threads takes chunks in turn (k, k + workers ...), which
+spreads the visible part of a scene evenly. Every triangle that may cover a pixel gets a *record*;
+records are in the order of prim_id, so that their numbers can decide ties of depth.
 """
 
 from __future__ import annotations
@@ -15,25 +15,38 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
+from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+from hybrid_rt.kernels._order import entry
 from hybrid_rt.kernels.clip import (
+    CLIPPED,
     HALF,
     MAX_CORNERS,
-    NEEDS_CLIP,
-    OUT_SCREEN,
+    OUT_BOTTOM,
+    OUT_LEFT,
+    OUT_RIGHT,
+    OUT_TOP,
     SUBPIXEL_BITS,
     clip_triangle,
 )
 
 TILE_BITS = 5
 TILE = 1 << TILE_BITS
-"""Pixels along a side of a tile; its keys stay in the L1 cache (see `hybrid_rt.kernels.tiles`)."""
-RECORD_INTS = 7
-"""x0 y0 x1 y1 x2 y2 in sub-pixels, turning so that the inside is positive; prim_id."""
-RECORD_FLOATS = 5
-"""Depth at the screen's centre, ddx, ddy, farthest and nearest depth of the vertices."""
+"""Pixels along a side of a tile; they stay in the L1 cache (see `hybrid_rt.kernels.tiles`)."""
+RECORD_INTS, RECORD_FLOATS = 16, 8
+"""A record is 64 bytes, read as int32 or as float64."""
+FACE, NEAREST, FARTHEST = 6, 7, 8
+"""Of int32, behind x0 y0 x1 y1 x2 y2 in sub-pixels, turning so that the inside is positive:
+prim_id, and the bits of the float32 depths of the nearest and the farthest vertex; NOTHING for the
+nearest if nothing is covered after all."""
+NOTHING = 0
+PLANE = 5
+"""Of float64: depth at the screen's centre, ddx, ddy."""
 HUGE = 1e300
 """Planes steeper than this would overflow while they are evaluated."""
+LANES, PLANE_LANES = 16, 8
+"""Faces that are culled together, and whose planes are made together."""
+SCREEN_ROWS = 10
 
 
 @inlined
@@ -79,8 +92,8 @@ def pixel_box(x0, y0, x1, y1, x2, y2, width, height):
 
 
 @inlined
-def bin_triangle(x0, y0, x1, y1, x2, y2, i0, j0, i1, j1, tiles_x, record, cursor, bins):
-    """Count, or with record >= 0 note, a positive triangle in each tile it may cover.
+def bin_triangle(x0, y0, x1, y1, x2, y2, i0, j0, i1, j1, tiles_x, entry, cursor, bins):
+    """Count, or with entry >= 0 note, a positive triangle in each tile it may cover.
 
     `cursor` (tiles,) int32 is advanced; the same tiles are found in both passes.
     """
@@ -92,8 +105,8 @@ def bin_triangle(x0, y0, x1, y1, x2, y2, i0, j0, i1, j1, tiles_x, record, cursor
         for v in range(v0, v1 + 1):
             for u in range(u0, u1 + 1):
                 tile = v * tiles_x + u
-                if record >= 0:
-                    bins[cursor[tile]] = record
+                if entry >= 0:
+                    bins[cursor[tile]] = entry
                 cursor[tile] += 1
         return
     a0, b0, c0 = edge(x0, y0, x1, y1)
@@ -111,8 +124,8 @@ def bin_triangle(x0, y0, x1, y1, x2, y2, i0, j0, i1, j1, tiles_x, record, cursor
                 and highest(a2, b2, c2, il, jl, ih, jh) >= 0
             ):
                 tile = v * tiles_x + u
-                if record >= 0:
-                    bins[cursor[tile]] = record
+                if entry >= 0:
+                    bins[cursor[tile]] = entry
                 cursor[tile] += 1
 
 
@@ -133,8 +146,30 @@ def fan_sign(corners, n):
 
 
 @inlined
-def plane_of(vertices, faces, face, eye, frame, near, out):
-    """Write the depth plane of a triangle and the range of its vertices' depths.
+def vertices_of(face, live, faces):
+    """Return the numbers of the vertices of faces."""
+    at = face * 3
+    return (
+        simd.gather(faces, at, live, 0),
+        simd.gather(faces, at + 1, live, 0),
+        simd.gather(faces, at + 2, live, 0),
+    )
+
+
+@inlined
+def vertex(vertices, v, live):
+    """Return the coordinates of vertices in float64."""
+    at = v * 3
+    return (
+        simd.to_f64(simd.gather(vertices, at, live, 0.0)),
+        simd.to_f64(simd.gather(vertices, at + 1, live, 0.0)),
+        simd.to_f64(simd.gather(vertices, at + 2, live, 0.0)),
+    )
+
+
+@inlined
+def write_planes(vertices, faces, face, live, record, eye, frame, near, ints, planes):
+    """Write the depth planes of faces and the ranges of their vertices' depths to their records.
 
     With n = (b - a) x (c - a) and d = n . (a - eye), the ray eye + z r through a pixel, whose r has
     z_view = 1, meets the plane at z = d / (n . r). So depth = near / z = near (n . r) / d, linear
@@ -143,74 +178,188 @@ def plane_of(vertices, faces, face, eye, frame, near, out):
     screen's centre as the reference keeps the sum free of large terms that cancel. The rows of
     `frame` are right / f, -up / f and forward.
 
-    A plane through the eye, or a triangle without area, gets NaN: it covers nothing.
+    A plane through the eye covers nothing.
     """
-    i = faces[face, 0]
-    j = faces[face, 1]
-    k = faces[face, 2]
-    ax = np.float64(vertices[i, 0])
-    ay = np.float64(vertices[i, 1])
-    az = np.float64(vertices[i, 2])
-    ux = np.float64(vertices[j, 0]) - ax
-    uy = np.float64(vertices[j, 1]) - ay
-    uz = np.float64(vertices[j, 2]) - az
-    vx = np.float64(vertices[k, 0]) - ax
-    vy = np.float64(vertices[k, 1]) - ay
-    vz = np.float64(vertices[k, 2]) - az
+    v0, v1, v2 = vertices_of(face, live, faces)
+    ax, ay, az = vertex(vertices, v0, live)
+    ux, uy, uz = vertex(vertices, v1, live)
+    vx, vy, vz = vertex(vertices, v2, live)
+    ux, uy, uz = ux - ax, uy - ay, uz - az
+    vx, vy, vz = vx - ax, vy - ay, vz - az
     nx = uy * vz - uz * vy
     ny = uz * vx - ux * vz
     nz = ux * vy - uy * vx
-    ax -= eye[0]
-    ay -= eye[1]
-    az -= eye[2]
-    # 0 / 0 and 1 / 0 make the NaN that is wanted.
+    ax, ay, az = ax - eye[0], ay - eye[1], az - eye[2]
     scale = near / (nx * ax + ny * ay + nz * az)
     ddx = scale * (nx * frame[0, 0] + ny * frame[0, 1] + nz * frame[0, 2])
     ddy = scale * (nx * frame[1, 0] + ny * frame[1, 1] + nz * frame[1, 2])
     centre = scale * (nx * frame[2, 0] + ny * frame[2, 1] + nz * frame[2, 2])
-    if not (abs(centre) < HUGE and abs(ddx) < HUGE and abs(ddy) < HUGE):
-        centre = np.nan
+    # False for the NaN and the infinities of a division by zero.
+    some = (simd.absolute(centre) < HUGE) & (simd.absolute(ddx) < HUGE)
+    some = some & (simd.absolute(ddy) < HUGE)
     za = frame[2, 0] * ax + frame[2, 1] * ay + frame[2, 2] * az
     zb = za + (frame[2, 0] * ux + frame[2, 1] * uy + frame[2, 2] * uz)
     zc = za + (frame[2, 0] * vx + frame[2, 1] * vy + frame[2, 2] * vz)
-    out[0] = centre
-    out[1] = ddx
-    out[2] = ddy
-    out[3] = near / max(za, zb, zc)
-    out[4] = near / max(min(za, zb, zc), near)
+    farthest = simd.to_f32(near / simd.maximum(simd.maximum(za, zb), zc))
+    nearest = simd.to_f32(near / simd.maximum(simd.minimum(simd.minimum(za, zb), zc), near))
+    nearest = simd.select(some, simd.bits_i32(nearest), NOTHING)
+    at = record * RECORD_FLOATS + PLANE
+    simd.scatter(planes, at, centre, live)
+    simd.scatter(planes, at + 1, ddx, live)
+    simd.scatter(planes, at + 2, ddy, live)
+    at = record * RECORD_INTS
+    simd.scatter(ints, at + FACE, face, live)
+    simd.scatter(ints, at + NEAREST, nearest, live)
+    simd.scatter(ints, at + FARTHEST, simd.bits_i32(farthest), live)
+
+
+@inlined
+def centres(a, b, c, last):
+    """Return the first and last pixel, of 0..last, with its centre between three coordinates."""
+    low = (simd.minimum(simd.minimum(a, b), c) + (HALF - 1)) >> SUBPIXEL_BITS
+    high = (simd.maximum(simd.maximum(a, b), c) - HALF) >> SUBPIXEL_BITS
+    return simd.maximum(low, 0), simd.minimum(high, last)
+
+
+@inlined
+def to_screen(v0, v1, v2, live, xy, width, height, screen):
+    """Project faces; return the bits of those that may cover a pixel and of those to be clipped.
+
+    v0, v1, v2: their vertices. The rows of screen (SCREEN_ROWS * LANES,) int32 are filled, a lane
+    for each face: the corners, turning so that the inside is positive, and the pixel box.
+    """
+    p0 = simd.gather(xy, v0, live, 0)
+    p1 = simd.gather(xy, v1, live, 0)
+    p2 = simd.gather(xy, v2, live, 0)
+    x0, y0 = simd.to_i32(p0), simd.to_i32(p0 >> 32)
+    x1, y1 = simd.to_i32(p1), simd.to_i32(p1 >> 32)
+    x2, y2 = simd.to_i32(p2), simd.to_i32(p2 >> 32)
+    clip = (x0 == CLIPPED) | (x1 == CLIPPED) | (x2 == CLIPPED)
+    i0, i1 = centres(x0, x1, x2, width - 1)
+    j0, j1 = centres(y0, y1, y2, height - 1)
+    # The guard band keeps the products below 2^49: exact in float64.
+    area = simd.to_f64(x1 - x0) * simd.to_f64(y2 - y0) - simd.to_f64(y1 - y0) * simd.to_f64(x2 - x0)
+    some = live & ~clip & (i0 <= i1) & (j0 <= j1) & (area != 0.0)
+    turned = area < 0.0
+    x1, x2 = simd.select(turned, x2, x1), simd.select(turned, x1, x2)
+    y1, y2 = simd.select(turned, y2, y1), simd.select(turned, y1, y2)
+    wide, high = i1 - i0, j1 - j0
+    small = (wide <= 1) & (high <= 1)
+    if simd.any_(some & small):
+        left, top = (i0 << SUBPIXEL_BITS) + HALF, (j0 << SUBPIXEL_BITS) + HALF
+        some = some & (
+            ~small
+            | covers_any(
+                x0 - left, y0 - top, x1 - left, y1 - top, x2 - left, y2 - top, wide > 0, high > 0
+            )
+        )
+    simd.store(screen, 0, x0)
+    simd.store(screen, LANES, y0)
+    simd.store(screen, 2 * LANES, x1)
+    simd.store(screen, 3 * LANES, y1)
+    simd.store(screen, 4 * LANES, x2)
+    simd.store(screen, 5 * LANES, y2)
+    simd.store(screen, 6 * LANES, i0)
+    simd.store(screen, 7 * LANES, j0)
+    simd.store(screen, 8 * LANES, i1)
+    simd.store(screen, 9 * LANES, j1)
+    return simd.bits(some), simd.bits(live & clip)
+
+
+@inlined
+def small_edge(ax, ay, bx, by):
+    """Return 256 E of `edge` at (0, 0), and what it gains to the next pixel in x and in y.
+
+    For edges of a few pixels near (0, 0), in int32.
+    """
+    a, b = ay - by, bx - ax
+    top_left = (a > 0) | (a == 0) & (b > 0)
+    return -(a * ax + b * ay) - simd.to_i32(~top_left), a << SUBPIXEL_BITS, b << SUBPIXEL_BITS
+
+
+@inlined
+def covers_any(x0, y0, x1, y1, x2, y2, wide, high):
+    """Is a centre of the box covered: (0, 0), with `wide` the one beside it, with `high` below."""
+    e0, a0, b0 = small_edge(x0, y0, x1, y1)
+    e1, a1, b1 = small_edge(x1, y1, x2, y2)
+    e2, a2, b2 = small_edge(x2, y2, x0, y0)
+    upper = (e0 | e1 | e2) >= 0
+    upper = upper | wide & (((e0 + a0) | (e1 + a1) | (e2 + a2)) >= 0)
+    e0, e1, e2 = e0 + b0, e1 + b1, e2 + b2
+    lower = (e0 | e1 | e2) >= 0
+    lower = lower | wide & (((e0 + a0) | (e1 + a1) | (e2 + a2)) >= 0)
+    return upper | high & lower
+
+
+@inlined
+def bin_lane(lane, screen, tiles_x, entry, cursor, bins):
+    """Count, or with entry >= 0 note, a face that `to_screen` has seen."""
+    bin_triangle(
+        screen[lane], screen[LANES + lane], screen[2 * LANES + lane],
+        screen[3 * LANES + lane], screen[4 * LANES + lane], screen[5 * LANES + lane],
+        screen[6 * LANES + lane], screen[7 * LANES + lane], screen[8 * LANES + lane],
+        screen[9 * LANES + lane], tiles_x, entry, cursor, bins,
+    )  # fmt: skip
+
+
+@inlined
+def beside(point, width, height):
+    """Return the sides of the screen that a vertex lies outside of."""
+    x = np.int32(point)
+    y = np.int32(point >> 32)
+    if x == CLIPPED:
+        return np.int64(y)
+    across = OUT_LEFT if x < 0 else OUT_RIGHT if x > width << SUBPIXEL_BITS else 0
+    down = OUT_TOP if y < 0 else OUT_BOTTOM if y > height << SUBPIXEL_BITS else 0
+    return np.int64(across | down)
 
 
 @parallel_kernel
 def cull_and_count(
-    vertices, faces, first, last, eye, m, width, height, near, xy, out, tiles_x,
-    lanes, chunk, survivors, n_survivors, n_records, counts,
+    vertices, faces, first, last, eye, m, width, height, near, xy, tiles_x,
+    workers, chunk, survivors, n_survivors, n_records, counts,
 ):  # fmt: skip
     """Find the faces first..last-1 that may cover a pixel, and how many records each tile gets.
 
-    xy, out: `hybrid_rt.kernels.clip.transform_vertices`; chunk: faces in a chunk. Out come
-    survivors (last - first,) int32, for each chunk at its own place (~face for a face that is to be
-    clipped), n_survivors, n_records (chunks,) int32 and counts (chunks, tiles) int32.
+    xy: `hybrid_rt.kernels.clip.transform_vertices`; chunk: faces in a chunk. Out come survivors
+    (last - first,) int32, for each chunk at its own place (~face for a face that is to be clipped),
+    n_survivors, n_records (chunks,) int32 and counts (chunks, tiles) int32.
     """
-    for lane in prange(lanes):
+    for worker in prange(workers):
         q = np.empty((MAX_CORNERS + 1, 3), np.float64)
         spare = np.empty((MAX_CORNERS + 1, 3), np.float64)
         corners = np.empty((MAX_CORNERS + 1, 2), np.int32)
-        no_bins = np.empty(1, np.int32)
-        for c in range(lane, len(counts), lanes):
-            counts[c, :] = 0
+        no_bins = np.empty(1, np.int64)
+        screen = np.empty(SCREEN_ROWS * LANES, np.int32)
+        for c in range(worker, len(counts), workers):
+            count = counts[c]
+            count[:] = 0
             begin = first + c * chunk
+            end = min(begin + chunk, last)
             kept = begin - first
             records = 0
-            for face in range(begin, min(begin + chunk, last)):
-                v0 = faces[face, 0]
-                v1 = faces[face, 1]
-                v2 = faces[face, 2]
-                o0 = out[v0]
-                o1 = out[v1]
-                o2 = out[v2]
-                if (o0 & o1 & o2 & OUT_SCREEN) != 0:
-                    continue
-                if ((o0 | o1 | o2) & NEEDS_CLIP) != 0:
+            for at in range(begin, end, LANES):
+                v0, v1, v2 = simd.load_triples(faces, 3 * at, end - at, LANES)
+                seen, clip = to_screen(
+                    v0, v1, v2, simd.first(end - at, LANES), xy, width, height, screen
+                )
+                some = seen | clip
+                while some != 0:
+                    k = simd.lowest(some)
+                    some &= some - 1
+                    face = at + k
+                    if (seen >> k) & 1 != 0:
+                        survivors[kept] = face
+                        kept += 1
+                        records += 1
+                        bin_lane(k, screen, tiles_x, -1, count, no_bins)
+                        continue
+                    if (
+                        beside(xy[faces[face, 0]], width, height)
+                        & beside(xy[faces[face, 1]], width, height)
+                        & beside(xy[faces[face, 2]], width, height)
+                    ) != 0:
+                        continue
                     n = clip_triangle(vertices, faces, face, eye, m, near, q, spare, corners)
                     sign = fan_sign(corners, n)
                     found = 0
@@ -223,24 +372,12 @@ def cull_and_count(
                             found += 1
                             bin_triangle(
                                 x0, y0, x1, y1, x2, y2, i0, j0, i1, j1, tiles_x,
-                                -1, counts[c], no_bins,
+                                -1, count, no_bins,
                             )  # fmt: skip
                     if found > 0:
                         survivors[kept] = ~face
                         kept += 1
                         records += found
-                    continue
-                hit, x0, y0, x1, y1, x2, y2, i0, j0, i1, j1 = oriented(
-                    xy[v0, 0], xy[v0, 1], xy[v1, 0], xy[v1, 1], xy[v2, 0], xy[v2, 1],
-                    0, width, height,
-                )  # fmt: skip
-                if hit:
-                    survivors[kept] = face
-                    kept += 1
-                    records += 1
-                    bin_triangle(
-                        x0, y0, x1, y1, x2, y2, i0, j0, i1, j1, tiles_x, -1, counts[c], no_bins
-                    )
             n_survivors[c] = kept - (begin - first)
             n_records[c] = records
 
@@ -258,25 +395,7 @@ def oriented(x0, y0, x1, y1, x2, y2, sign, width, height):
         hit = area != 0 and not (sign > 0 and area < 0) and not (sign < 0 and area > 0)
         if area < 0:
             x1, y1, x2, y2 = x2, y2, x1, y1
-        if hit and i1 - i0 <= 1 and j1 - j0 <= 1:
-            hit = covers_any(x0, y0, x1, y1, x2, y2, i0, j0, i1, j1)
     return hit, x0, y0, x1, y1, x2, y2, i0, j0, i1, j1
-
-
-@inlined
-def covers_any(x0, y0, x1, y1, x2, y2, i0, j0, i1, j1):
-    """Is one of the (at most four) centres of the box covered."""
-    a0, b0, c0 = edge(x0, y0, x1, y1)
-    a1, b1, c1 = edge(x1, y1, x2, y2)
-    a2, b2, c2 = edge(x2, y2, x0, y0)
-    outside = np.int64(-1)
-    for j in range(j0, j1 + 1):
-        for i in range(i0, i1 + 1):
-            e0 = a0 * i + b0 * j + c0
-            e1 = a1 * i + b1 * j + c1
-            e2 = a2 * i + b2 * j + c2
-            outside &= e0 | e1 | e2
-    return outside >= 0
 
 
 @kernel
@@ -307,63 +426,92 @@ def prefix_sums(n_records, counts, record_start, tile_start):
 
 
 @inlined
-def write_record(record, x0, y0, x1, y1, x2, y2, face, ints):
-    """Fill the integer half of a record."""
+def write_corners(record, x0, y0, x1, y1, x2, y2, ints):
+    """Fill the corners of a record."""
     ints[record, 0] = x0
     ints[record, 1] = y0
     ints[record, 2] = x1
     ints[record, 3] = y1
     ints[record, 4] = x2
     ints[record, 5] = y2
-    ints[record, 6] = face
+
+
+@inlined
+def write_records(chosen, places, count, vertices, faces, eye, frame, near, ints, planes):
+    """Write all of the records but their corners: faces `chosen` to `places`, (LANES,) int32."""
+    for k in range(0, LANES, PLANE_LANES):
+        write_planes(
+            vertices, faces, simd.load(chosen, k, PLANE_LANES), simd.first(count - k, PLANE_LANES),
+            simd.load(places, k, PLANE_LANES), eye, frame, near, ints, planes,
+        )  # fmt: skip
 
 
 @parallel_kernel
 def fill_bins(
     vertices, faces, first, eye, m, frame, width, height, near, xy, tiles_x,
-    lanes, chunk, survivors, n_survivors, record_start, cursors, ints, floats, bins,
+    workers, chunk, survivors, n_survivors, record_start, cursors, ints, planes, bins,
 ):  # fmt: skip
     """Write the records and the bins that `cull_and_count` has counted.
 
-    ints (records, RECORD_INTS) int32, floats (records, RECORD_FLOATS) float64, bins (entries,)
-    int32 of records. `first` is the first face of the batch.
+    ints (records, RECORD_INTS) int32, planes the same as float64, bins (entries,) int64, see
+    `hybrid_rt.kernels._order`. `first` is the first face of the batch.
     """
-    for lane in prange(lanes):
+    for worker in prange(workers):
         q = np.empty((MAX_CORNERS + 1, 3), np.float64)
         spare = np.empty((MAX_CORNERS + 1, 3), np.float64)
         corners = np.empty((MAX_CORNERS + 1, 2), np.int32)
-        for c in range(lane, len(cursors), lanes):
+        screen = np.empty(SCREEN_ROWS * LANES, np.int32)
+        chosen = np.zeros(LANES, np.int32)
+        places = np.zeros(LANES, np.int32)
+        for c in range(worker, len(cursors), workers):
+            cursor = cursors[c]
             record = record_start[c]
-            for s in range(c * chunk, c * chunk + n_survivors[c]):
-                face = survivors[s]
-                if face < 0:
-                    face = ~face
-                    n = clip_triangle(vertices, faces, face, eye, m, near, q, spare, corners)
-                    sign = fan_sign(corners, n)
-                    for k in range(1, n - 1):
-                        hit, x0, y0, x1, y1, x2, y2, i0, j0, i1, j1 = oriented(
-                            corners[0, 0], corners[0, 1], corners[k, 0], corners[k, 1],
-                            corners[k + 1, 0], corners[k + 1, 1], sign, width, height,
+            s = c * chunk
+            end = s + n_survivors[c]
+            while s < end:
+                count = 0
+                while s < end and count < LANES and survivors[s] >= 0:
+                    chosen[count] = survivors[s]
+                    places[count] = record
+                    record += 1
+                    count += 1
+                    s += 1
+                if count > 0:
+                    live = simd.first(count, LANES)
+                    v0, v1, v2 = vertices_of(simd.load(chosen, 0, LANES), live, faces)
+                    to_screen(v0, v1, v2, live, xy, width, height, screen)
+                    write_records(
+                        chosen, places, count, vertices, faces, eye, frame, near, ints, planes
+                    )
+                    for k in range(count):
+                        place = places[k]
+                        write_corners(
+                            place, screen[k], screen[LANES + k], screen[2 * LANES + k],
+                            screen[3 * LANES + k], screen[4 * LANES + k],
+                            screen[5 * LANES + k], ints,
                         )  # fmt: skip
-                        if hit:
-                            write_record(record, x0, y0, x1, y1, x2, y2, face, ints)
-                            plane_of(vertices, faces, face, eye, frame, near, floats[record])
-                            bin_triangle(
-                                x0, y0, x1, y1, x2, y2, i0, j0, i1, j1, tiles_x,
-                                record, cursors[c], bins,
-                            )  # fmt: skip
-                            record += 1
+                        bin_lane(
+                            k, screen, tiles_x, entry(ints[place, NEAREST], place), cursor, bins
+                        )
                     continue
-                v0 = faces[face, 0]
-                v1 = faces[face, 1]
-                v2 = faces[face, 2]
-                _, x0, y0, x1, y1, x2, y2, i0, j0, i1, j1 = oriented(
-                    xy[v0, 0], xy[v0, 1], xy[v1, 0], xy[v1, 1], xy[v2, 0], xy[v2, 1],
-                    0, width, height,
-                )  # fmt: skip
-                write_record(record, x0, y0, x1, y1, x2, y2, face, ints)
-                plane_of(vertices, faces, face, eye, frame, near, floats[record])
-                bin_triangle(
-                    x0, y0, x1, y1, x2, y2, i0, j0, i1, j1, tiles_x, record, cursors[c], bins
-                )
-                record += 1
+                face = ~survivors[s]
+                s += 1
+                n = clip_triangle(vertices, faces, face, eye, m, near, q, spare, corners)
+                sign = fan_sign(corners, n)
+                for k in range(1, n - 1):
+                    hit, x0, y0, x1, y1, x2, y2, i0, j0, i1, j1 = oriented(
+                        corners[0, 0], corners[0, 1], corners[k, 0], corners[k, 1],
+                        corners[k + 1, 0], corners[k + 1, 1], sign, width, height,
+                    )  # fmt: skip
+                    if hit:
+                        chosen[0] = face
+                        places[0] = record
+                        write_records(
+                            chosen, places, 1, vertices, faces, eye, frame, near, ints, planes
+                        )
+                        write_corners(record, x0, y0, x1, y1, x2, y2, ints)
+                        bin_triangle(
+                            x0, y0, x1, y1, x2, y2, i0, j0, i1, j1, tiles_x,
+                            entry(ints[record, NEAREST], record), cursor, bins,
+                        )  # fmt: skip
+                        record += 1

@@ -1,8 +1,8 @@
 """The second half of a tiled rasteriser: draw the bin of each tile, on its own and on one thread.
 
-The visible surface of a pixel is one float64 *key*: the depth as float32 and, in the bits that this
-leaves empty, the rank of its record. So the nearest record, and among equals the first, is a plain
-maximum, which LLVM can make vectors of; the order of drawing does not matter.
+The nearest record has a pixel, and among equals the first, so the order of drawing does not matter.
+Records are set up LANES at a time, then drawn one after the other, a vector of pixels at a time and
+without a branch on what is covered: guessing wrong costs more than a vector.
 """
 
 from __future__ import annotations
@@ -11,216 +11,238 @@ import numpy as np
 from numba import prange
 
 from hybrid_rt.kernels import simd
+from hybrid_rt.kernels._aligned import aligned
+from hybrid_rt.kernels._borrow import borrowed, keep
 from hybrid_rt.kernels._jit import inlined, parallel_kernel
 from hybrid_rt.kernels._order import BUCKETS, near_first
 from hybrid_rt.kernels._queue import fetch_add
-from hybrid_rt.kernels.clip import HALF, SUBPIXEL_BITS
+from hybrid_rt.kernels.clip import HALF, ONE, SUBPIXEL_BITS
 from hybrid_rt.kernels.raster import (
+    FACE,
+    FARTHEST,
+    LANES,
+    NEAREST,
+    NOTHING,
+    PLANE,
     RECORD_FLOATS,
     RECORD_INTS,
     TILE,
     TILE_BITS,
-    edge,
-    highest,
-    lowest,
+    centres,
 )
 
-BLOCK = 16
-"""Pixels of a row that are drawn together."""
-NARROW = 4
-"""The same for triangles that are no wider."""
-STRIDE = TILE + BLOCK
-"""Keys in a row of a tile; blocks run over its right end."""
-OLD = (1 << 29) - 1
-"""Rank of what an earlier batch has drawn. Record r has OLD - 1 - r: the smallest wins a tie."""
-LANES = 8
+NARROW = 8
+"""Records no wider than this are drawn so many pixels at a time, others LANES, an aligned half of a
+tile's row."""
+STRIDE = TILE + LANES
+"""Pixels in a row of a tile; narrow records run over its right end."""
+
 LARGEST = float(np.finfo(np.float32).max)
-REVISION = 16
-"""Records after which a tile finds out again behind which depth nothing can be seen."""
+NOBODY = -1
+"""Owner of a pixel that shows nothing yet, or what an earlier batch has drawn."""
+COLUMN_0, ROW_0, COLUMN_1, ROW_1, EDGE_A, EDGE_B, EDGE_C, SETUP_ROWS = 0, 1, 2, 3, 4, 7, 10, 13
+"""What a set-up makes of records, a lane each: the first and the last pixel of the tile that is
+drawn, and the three edges as functions of a pixel, from the first on."""
 
 
 @inlined
 def tile_edge(ax, ay, bx, by, i0, j0, i1, j1):
-    """Return (A, B, value at (i0, j0), is the box outside of the edge) in int32.
+    """Return A, B, value at (i0, j0) of edges a -> b in int32, and are their boxes outside of them.
 
-    An edge that the whole box is inside of is (0, 0, 0): always passed. Any other straddles the
-    box, so its values stay below 46 (|A| + |B|) < 2^31, as the guard band allows.
+    Pixel (i, j) is inside where A i + B j + C >= 0, as in `raster.edge`; coordinates are float64,
+    which holds all products: they are less than 2^50. An edge that its whole box is inside of is
+    (0, 0, 0): always passed. Any other straddles the box, so its values stay below
+    31 (|A| + |B|) < 2^31, as the guard band allows.
     """
-    a, b, c = edge(ax, ay, bx, by)
-    if lowest(a, b, c, i0, j0, i1, j1) >= 0:
-        return np.int32(0), np.int32(0), np.int32(0), False
-    if highest(a, b, c, i0, j0, i1, j1) < 0:
-        return np.int32(0), np.int32(0), np.int32(0), True
-    return np.int32(a), np.int32(b), np.int32(c + a * i0 + b * j0), False
+    a, b = ay - by, bx - ax
+    top_left = (a > 0.0) | (a == 0.0) & (b > 0.0)
+    c = a * (HALF - ax) + b * (HALF - ay) - simd.to_f64(~top_left)
+    c = simd.floor(c * (1.0 / ONE))
+    left, right, top, bottom = a * i0, a * i1, b * j0, b * j1
+    inside = c + simd.minimum(left, right) + simd.minimum(top, bottom) >= 0.0
+    outside = c + simd.maximum(left, right) + simd.maximum(top, bottom) < 0.0
+    zero = simd.i32(0, LANES)
+    return (
+        simd.select(inside, zero, simd.to_i32(a)),
+        simd.select(inside, zero, simd.to_i32(b)),
+        simd.select(inside, zero, simd.to_i32(c + left + top)),
+        outside,
+    )
 
 
 @inlined
-def pack(depth, rank):
-    """Return a float64 that orders by float32 depth first and by rank (< 2^29) then.
+def corner(records, k, ints, live, left, top):
+    """Return x and y of corner k of records, in sub-pixels from the first pixel of a tile."""
+    at = records * RECORD_INTS + 2 * k
+    return (
+        simd.gather(ints, at, live, 0) - np.int32(left << SUBPIXEL_BITS),
+        simd.gather(ints, at + 1, live, 0) - np.int32(top << SUBPIXEL_BITS),
+    )
 
-    A float32 leaves the 29 low bits of a float64 empty; the rank goes there.
+
+@inlined
+def set_up(chosen, count, ints, left, top, columns, rows, setup):
+    """Fill `setup` for the first records of `chosen`, LANES at most; return the bits of those seen.
+
+    (left, top) is the first pixel of the tile; columns, rows: of its pixels.
     """
-    return np.int64(np.float64(np.float32(depth)).view(np.int64) | rank).view(np.float64)
-
-
-@inlined
-def unpack(key):
-    """Return the depth and the rank that `pack` has put together."""
-    bits = np.float64(key).view(np.int64)
-    return np.float32(np.int64(bits & ~OLD).view(np.float64)), bits & OLD
-
-
-@inlined
-def draw_pixels(n, e0, e1, e2, a0, a1, a2, row, ddx, x, farthest, nearest, rank, keys):
-    """Rasterise `n` pixels of a row; `n` is a constant and nothing branches, for LLVM's vectors."""
-    for i in range(n):
-        k = np.int32(i)
-        f0 = np.int32(e0 + a0 * k)
-        f1 = np.int32(e1 + a1 * k)
-        f2 = np.int32(e2 + a2 * k)
-        d = max(min(row + ddx * (np.float64(k) + x), nearest), farthest)
-        new = pack(d, rank) if np.int32(f0 | f1 | f2) >= 0 else 0.0
-        # Without the sum LLVM makes this a masked store, ten times slower than a plain one on Zen.
-        old = keys[i] + 0.0
-        keys[i] = old if old > new else new
-
-
-@inlined
-def draw(record, ints, floats, left, top, right, bottom, cx, cy, keys):
-    """Rasterise one record into the keys (TILE * STRIDE,) float64 of a tile."""
-    x0 = ints[record, 0]
-    y0 = ints[record, 1]
-    x1 = ints[record, 2]
-    y1 = ints[record, 3]
-    x2 = ints[record, 4]
-    y2 = ints[record, 5]
-    i0 = max((min(x0, x1, x2) + (HALF - 1)) >> SUBPIXEL_BITS, left)
-    i1 = min((max(x0, x1, x2) - HALF) >> SUBPIXEL_BITS, right)
-    j0 = max((min(y0, y1, y2) + (HALF - 1)) >> SUBPIXEL_BITS, top)
-    j1 = min((max(y0, y1, y2) - HALF) >> SUBPIXEL_BITS, bottom)
+    records = simd.load(chosen, 0, LANES)
+    live = simd.first(count, LANES)
+    x0, y0 = corner(records, 0, ints, live, left, top)
+    x1, y1 = corner(records, 1, ints, live, left, top)
+    x2, y2 = corner(records, 2, ints, live, left, top)
+    i0, i1 = centres(x0, x1, x2, columns - 1)
+    j0, j1 = centres(y0, y1, y2, rows - 1)
     narrow = i1 - i0 < NARROW
-    i1 = i0 + ((i1 - i0) | ((NARROW if narrow else BLOCK) - 1))
-    a0, b0, e0, out0 = tile_edge(x0, y0, x1, y1, i0, j0, i1, j1)
-    a1, b1, e1, out1 = tile_edge(x1, y1, x2, y2, i0, j0, i1, j1)
-    a2, b2, e2, out2 = tile_edge(x2, y2, x0, y0, i0, j0, i1, j1)
-    centre = floats[record, 0]
-    if out0 or out1 or out2 or np.isnan(centre):
-        return
-    ddx = floats[record, 1]
-    ddy = floats[record, 2]
-    farthest = floats[record, 3]
-    nearest = floats[record, 4]
-    rank = OLD - 1 - record
-    x = i0 + 0.5 - cx
-    if narrow:
-        for j in range(j1 - j0 + 1):
-            start = (j0 - top + j) * STRIDE + (i0 - left)
-            draw_pixels(
-                NARROW, np.int32(e0 + b0 * j), np.int32(e1 + b1 * j), np.int32(e2 + b2 * j),
-                a0, a1, a2, centre + ddy * ((j0 + j) + 0.5 - cy), ddx, x, farthest, nearest, rank,
-                keys[start : start + NARROW],
-            )  # fmt: skip
-        return
-    # What an edge gains at most and at least over a block.
-    most0 = np.int32(max(a0, 0) * (BLOCK - 1))
-    most1 = np.int32(max(a1, 0) * (BLOCK - 1))
-    most2 = np.int32(max(a2, 0) * (BLOCK - 1))
-    least0 = np.int32(min(a0, 0) * (BLOCK - 1))
-    least1 = np.int32(min(a1, 0) * (BLOCK - 1))
-    least2 = np.int32(min(a2, 0) * (BLOCK - 1))
-    # Column by column: what a block is, empty, full or mixed, changes seldom on the way down.
-    for i in range(0, i1 - i0 + 1, BLOCK):
-        for j in range(j1 - j0 + 1):
-            f0 = np.int32(e0 + a0 * i + b0 * j)
-            f1 = np.int32(e1 + a1 * i + b1 * j)
-            f2 = np.int32(e2 + a2 * i + b2 * j)
-            if (np.int32(f0 + most0) | np.int32(f1 + most1) | np.int32(f2 + most2)) < 0:
-                continue
-            row = centre + ddy * ((j0 + j) + 0.5 - cy)
-            start = (j0 - top + j) * STRIDE + (i0 - left) + i
-            block = keys[start : start + BLOCK]
-            if (np.int32(f0 + least0) | np.int32(f1 + least1) | np.int32(f2 + least2)) >= 0:
-                zero = np.int32(0)
-                draw_pixels(
-                    BLOCK, zero, zero, zero, zero, zero, zero,
-                    row, ddx, x + i, farthest, nearest, rank, block,
-                )  # fmt: skip
-            else:
-                draw_pixels(
-                    BLOCK, f0, f1, f2, a0, a1, a2,
-                    row, ddx, x + i, farthest, nearest, rank, block,
-                )  # fmt: skip
+    i0 = simd.select(narrow, i0, i0 & -LANES)
+    i1 = simd.select(narrow, i0 + (NARROW - 1), i1 | (LANES - 1))
+    u0, v0, u1, v1 = simd.to_f64(i0), simd.to_f64(j0), simd.to_f64(i1), simd.to_f64(j1)
+    x0, y0, x1 = simd.to_f64(x0), simd.to_f64(y0), simd.to_f64(x1)
+    y1, x2, y2 = simd.to_f64(y1), simd.to_f64(x2), simd.to_f64(y2)
+    a0, b0, c0, out0 = tile_edge(x0, y0, x1, y1, u0, v0, u1, v1)
+    a1, b1, c1, out1 = tile_edge(x1, y1, x2, y2, u0, v0, u1, v1)
+    a2, b2, c2, out2 = tile_edge(x2, y2, x0, y0, u0, v0, u1, v1)
+    simd.store(setup, COLUMN_0 * LANES, i0)
+    simd.store(setup, ROW_0 * LANES, j0)
+    simd.store(setup, COLUMN_1 * LANES, i1)
+    simd.store(setup, ROW_1 * LANES, j1)
+    simd.store(setup, EDGE_A * LANES, a0)
+    simd.store(setup, (EDGE_A + 1) * LANES, a1)
+    simd.store(setup, (EDGE_A + 2) * LANES, a2)
+    simd.store(setup, EDGE_B * LANES, b0)
+    simd.store(setup, (EDGE_B + 1) * LANES, b1)
+    simd.store(setup, (EDGE_B + 2) * LANES, b2)
+    simd.store(setup, EDGE_C * LANES, c0)
+    simd.store(setup, (EDGE_C + 1) * LANES, c1)
+    simd.store(setup, (EDGE_C + 2) * LANES, c2)
+    return simd.bits(live & ~(out0 | out1 | out2))
 
 
 @inlined
-def farthest_of(keys, columns, rows, lowest_key):
-    """Return the farthest depth of a tile, 0 if a pixel is still empty.
-
-    lowest_key (TILE,) float64 is scratch: minima down the columns are independent of each other,
-    so they are taken side by side.
-    """
-    lowest_key[:] = np.inf
+def draw_column(
+    n, at, rows, a0, a1, a2, b0, b1, b2, c0, c1, c2, x, y, plane, record, depths, owners
+):  # fmt: skip
+    """Rasterise `rows` rows of n pixels from pixel `at` on, (x, y) from the screen's centre."""
+    centre, ddx, ddy, nearest, farthest = plane
+    edge0, edge1, edge2 = simd.iota(n) * a0 + c0, simd.iota(n) * a1 + c1, simd.iota(n) * a2 + c2
+    across = (simd.to_f64(simd.iota(n)) + x) * ddx
     for j in range(rows):
-        line = keys[j * STRIDE : j * STRIDE + columns]
-        for i in range(columns):
-            key = line[i]
-            low = lowest_key[i] + 0.0  # see draw_pixels
-            lowest_key[i] = low if low < key else key
-    farthest = np.inf
-    for i in range(columns):
-        farthest = min(farthest, lowest_key[i])
-    return unpack(farthest)[0]
+        exact = across + (centre + ddy * (j + y))
+        depth = simd.maximum(simd.minimum(simd.to_f32(exact), nearest), farthest)
+        old, owner = simd.load(depths, at, n), simd.load(owners, at, n)
+        wins = (depth > old) | (depth == old) & (owner > record)
+        wins = wins & ((edge0 | edge1 | edge2) >= 0)
+        # Not stored under a mask, which takes ten times as long on Zen.
+        simd.store(depths, at, simd.select(wins, depth, old))
+        simd.store(owners, at, simd.select(wins, record, owner))
+        edge0, edge1, edge2 = edge0 + b0, edge1 + b1, edge2 + b2
+        at += STRIDE
 
 
 @inlined
-def depth_bits(floats, record):
-    """Return a record's nearest depth as the bits of a float32."""
-    return np.int64(np.float32(floats[record, 4]).view(np.int32))
+def draw(record, lane, setup, ints, planes, x, y, depths, owners):
+    """Rasterise a record that is set up in a lane into a tile's depths and owners.
+
+    The tile's first pixel is at (x, y) from the screen's centre.
+    """
+    i0 = np.int64(setup[COLUMN_0 * LANES + lane])
+    i1 = np.int64(setup[COLUMN_1 * LANES + lane])
+    j0 = np.int64(setup[ROW_0 * LANES + lane])
+    rows = setup[ROW_1 * LANES + lane] - j0 + 1
+    a0, b0 = setup[EDGE_A * LANES + lane], setup[EDGE_B * LANES + lane]
+    a1, b1 = setup[(EDGE_A + 1) * LANES + lane], setup[(EDGE_B + 1) * LANES + lane]
+    a2, b2 = setup[(EDGE_A + 2) * LANES + lane], setup[(EDGE_B + 2) * LANES + lane]
+    c0 = setup[EDGE_C * LANES + lane]
+    c1 = setup[(EDGE_C + 1) * LANES + lane]
+    c2 = setup[(EDGE_C + 2) * LANES + lane]
+    plane = (
+        planes[record, PLANE], planes[record, PLANE + 1], planes[record, PLANE + 2],
+        np.int32(ints[record, NEAREST]).view(np.float32),
+        np.int32(ints[record, FARTHEST]).view(np.float32),
+    )  # fmt: skip
+    if i1 - i0 < NARROW:
+        draw_column(
+            NARROW, j0 * STRIDE + i0, rows, a0, a1, a2, b0, b1, b2, c0, c1, c2,
+            x + i0, y + j0, plane, record, depths, owners,
+        )  # fmt: skip
+        return
+    for i in range(0, i1 - i0 + 1, LANES):
+        draw_column(
+            LANES, j0 * STRIDE + i0 + i, rows, a0, a1, a2, b0, b1, b2,
+            np.int32(c0 + a0 * i), np.int32(c1 + a1 * i), np.int32(c2 + a2 * i),
+            x + (i0 + i), y + j0, plane, record, depths, owners,
+        )  # fmt: skip
 
 
 @inlined
-def write_tile(left, top, right, bottom, fresh, keys, ints, floats, depth, ddx, ddy, prim_id):
+def farthest_of(depths, columns, rows):
+    """Return the farthest depth of a tile, 0 if a pixel is still empty."""
+    farthest = simd.f32(np.inf, LANES)
+    for j in range(rows):
+        for i in range(0, columns, LANES):
+            here = simd.load(depths, j * STRIDE + i, LANES)
+            farthest = simd.minimum(
+                farthest, simd.select(simd.first(columns - i, LANES), here, np.inf)
+            )
+    return simd.reduce_min(farthest)
+
+
+@inlined
+def write_tile(
+    left, top, columns, rows, fresh, depths, owners, ints, planes, depth, ddx, ddy, prim_id
+):  # fmt: skip
     """Write the pixels of a tile that have something new, with `fresh` all of them."""
-    for j in range(bottom - top + 1):
-        for i in range(0, right - left + 1, LANES):
-            bits = simd.bits_i64(simd.load(keys, j * STRIDE + i, LANES))
-            rank = simd.to_i32(bits & OLD)
-            nearest = simd.to_f32(simd.float_of_bits(bits & ~OLD))
-            live = simd.first(right - left + 1 - i, LANES)
-            new = live & (nearest > np.float32(0.0)) & (rank != OLD)
-            record = (OLD - 1) - rank
-            face = simd.gather(ints, record * RECORD_INTS + 6, new, -1)
+    for j in range(rows):
+        for i in range(0, columns, LANES):
+            nearest = simd.load(depths, j * STRIDE + i, LANES)
+            owner = simd.load(owners, j * STRIDE + i, LANES)
+            live = simd.first(columns - i, LANES)
+            new = live & (owner != NOBODY)
+            face = simd.gather(ints, owner * RECORD_INTS + FACE, new, -1)
             # The plane of a triangle seen edge-on can be steeper than float32 holds.
-            slope_x = simd.gather(floats, record * RECORD_FLOATS + 1, new, 0.0)
-            slope_x = simd.minimum(simd.maximum(slope_x, -LARGEST), LARGEST)
-            slope_y = simd.gather(floats, record * RECORD_FLOATS + 2, new, 0.0)
-            slope_y = simd.minimum(simd.maximum(slope_y, -LARGEST), LARGEST)
+            slope_x = simd.gather(planes, owner * RECORD_FLOATS + (PLANE + 1), new, 0.0)
+            slope_x = simd.to_f32(simd.minimum(simd.maximum(slope_x, -LARGEST), LARGEST))
+            slope_y = simd.gather(planes, owner * RECORD_FLOATS + (PLANE + 2), new, 0.0)
+            slope_y = simd.to_f32(simd.minimum(simd.maximum(slope_y, -LARGEST), LARGEST))
             at = (top + j) * depth.shape[1] + left + i
             written = live if fresh else new
-            simd.store_masked(depth, at, nearest, written)
-            simd.store_masked(ddx, at, simd.to_f32(slope_x), written)
-            simd.store_masked(ddy, at, simd.to_f32(slope_y), written)
-            simd.store_masked(prim_id, at, face, written)
+            if simd.all_(written):
+                simd.store(depth, at, nearest)
+                simd.store(ddx, at, slope_x)
+                simd.store(ddy, at, slope_y)
+                simd.store(prim_id, at, face)
+            else:
+                simd.store_masked(depth, at, nearest, written)
+                simd.store_masked(ddx, at, slope_x, written)
+                simd.store_masked(ddy, at, slope_y, written)
+                simd.store_masked(prim_id, at, face, written)
 
 
 @parallel_kernel
 def draw_tiles(
-    tile_start, bins, ints, floats, tiles_x, cx, cy, workers, fresh, depth, ddx, ddy, prim_id
+    tile_start, bins, ints, planes, tiles_x, cx, cy, workers, fresh, depth, ddx, ddy, prim_id
 ):  # fmt: skip
     """Draw every bin over what the images (H, W) already hold; (cx, cy) is the screen's centre.
 
-    With `fresh` they hold nothing yet, and all pixels are written.
+    Bins, ints and planes are those of `raster.fill_bins`. With `fresh` the images hold nothing yet,
+    and all pixels are written.
     """
     height, width = depth.shape
     tiles = len(tile_start) - 1
     most = 0
     for tile in range(tiles):
         most = max(most, tile_start[tile + 1] - tile_start[tile])
+    ints, planes = borrowed(ints), borrowed(planes)
+    depth, ddx, ddy, prim_id = borrowed(depth), borrowed(ddx), borrowed(ddy), borrowed(prim_id)
     taken = np.zeros(1, np.int64)
     for _ in prange(workers):
-        keys = np.empty(TILE * STRIDE, np.float64)
-        lowest_key = np.empty(TILE, np.float64)
-        order = np.empty(most, np.int32)
+        pixels = aligned(TILE * STRIDE)
+        depths = borrowed(pixels.view(np.float32)[: TILE * STRIDE])
+        owners = borrowed(pixels.view(np.int32)[TILE * STRIDE :])
+        lanes = aligned(SETUP_ROWS * LANES // 2)
+        setup = borrowed(lanes.view(np.int32))
+        chosen = np.zeros(LANES, np.int32)
+        order = np.empty(most, np.int64)
         heads = np.empty(BUCKETS + 1, np.int32)
         tile = fetch_add(taken.ctypes.data, 1)
         while tile < tiles:
@@ -228,29 +250,40 @@ def draw_tiles(
             if fresh or end > start:
                 left = (tile % tiles_x) << TILE_BITS
                 top = (tile // tiles_x) << TILE_BITS
-                right = min(left + TILE, width) - 1
-                bottom = min(top + TILE, height) - 1
-                keys[:] = 0.0
+                columns, rows = min(TILE, width - left), min(TILE, height - top)
+                depths[:] = np.float32(0.0)
+                owners[:] = NOBODY
                 if not fresh:
-                    for j in range(bottom - top + 1):
-                        for i in range(right - left + 1):
-                            old = depth[top + j, left + i]
-                            if old > 0.0:
-                                keys[j * STRIDE + i] = pack(old, OLD)
-                near_first(bins, start, end, depth_bits, floats, order, heads)
-                hidden = np.float32(0.0)
-                until = REVISION
-                for at in range(end - start):
-                    record = order[at]
-                    if at == until:
-                        hidden = farthest_of(keys, right - left + 1, bottom - top + 1, lowest_key)
-                        until += REVISION
-                    if np.float32(floats[record, 4]) >= hidden:
-                        draw(record, ints, floats, left, top, right, bottom, cx, cy, keys)
+                    for j in range(rows):
+                        for i in range(columns):
+                            depths[j * STRIDE + i] = depth[top + j, left + i]
+                near_first(bins, start, end, order, heads)
+                at = np.int64(0)
+                while at < end - start:
+                    farthest = np.float32(farthest_of(depths, columns, rows))
+                    hidden = max(np.int64(farthest.view(np.int32)), NOTHING + 1)
+                    count = 0
+                    while count < LANES and at < end - start:
+                        entry = order[at]
+                        at += 1
+                        if entry >> 32 >= hidden:
+                            chosen[count] = entry & 0xFFFFFFFF
+                            count += 1
+                    seen = set_up(chosen, count, ints, left, top, columns, rows, setup)
+                    while seen != 0:
+                        lane = simd.lowest(seen)
+                        seen &= seen - 1
+                        draw(
+                            chosen[lane], lane, setup, ints, planes, left + 0.5 - cx,
+                            top + 0.5 - cy, depths, owners,
+                        )  # fmt: skip
                 write_tile(
-                    left, top, right, bottom, fresh, keys, ints, floats, depth, ddx, ddy, prim_id
-                )
+                    left, top, columns, rows, fresh, depths, owners, ints, planes,
+                    depth, ddx, ddy, prim_id,
+                )  # fmt: skip
             tile = fetch_add(taken.ctypes.data, 1)
+        keep(pixels)
+        keep(lanes)
 
 
 @parallel_kernel

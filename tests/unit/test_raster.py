@@ -1,11 +1,16 @@
 """The rasteriser against the naive one, and what it promises."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
 import hybrid_rt as hrt
 from hybrid_rt import raster as raster_module
 from naive import raster as naive
+from unit.test_simd import MACHINES, machine
 
 CHANNELS = ("depth", "ddx", "ddy", "prim_id")
 
@@ -276,6 +281,46 @@ def test_threads_change_nothing_and_inputs_stay():
     same(hrt.rasterize(scene, camera, threads=1), hrt.rasterize(scene, camera))
     assert np.array_equal(scene.vertices, before[0])
     assert np.array_equal(scene.faces, before[1])
+
+
+PROGRAM = """
+import sys
+import numpy as np
+from unit.test_raster import CHANNELS, everywhere
+
+gbuffer = everywhere()
+np.savez(sys.argv[1], **{name: getattr(gbuffer, name) for name in CHANNELS})
+"""
+
+
+def everywhere():
+    """Return what is seen from amidst triangles that are large, small and behind the eye."""
+    rng = np.random.default_rng(7)
+    parts = [soup(rng, n, size) for n, size in ((6, 2.0), (400, 0.1), (4000, 0.02))]
+    scene = hrt.Scene.from_arrays(
+        np.concatenate([part.vertices for part in parts]),
+        np.arange(3 * 4406, dtype=np.int32).reshape(-1, 3),
+    )
+    camera = hrt.Camera.look_at((0, 0, 4), (0.1, 0.2, 0), width=150, height=99)
+    return hrt.rasterize(scene, camera)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_the_same_on_another_machine(name, tmp_path):
+    env, _ = machine(name)
+    env["PYTHONPATH"] = os.pathsep.join(sys.path)
+    path = tmp_path / "gbuffer.npz"
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(path)],
+        env=env, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    gbuffer = everywhere()
+    shown = np.histogram(gbuffer.prim_id, [-1, 0, 6, 406, 4406])[0]
+    assert (shown > 100).all()
+    with np.load(path) as other:
+        for channel in CHANNELS:
+            assert np.array_equal(getattr(gbuffer, channel), other[channel]), channel
 
 
 @pytest.mark.parametrize(
