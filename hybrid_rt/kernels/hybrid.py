@@ -82,13 +82,6 @@ def vertex(vertices, faces, face, corner, m):
 
 
 @inlined
-def point(origin, direction, at, axis, distance, m):
-    """Return a coordinate of the point at a distance along rays, float64, for lanes m."""
-    o = simd.to_f64(simd.gather(origin, at + I32(axis), m, F32(0.0)))
-    return o + distance * simd.to_f64(simd.gather(direction, at + I32(axis), m, F32(0.0)))
-
-
-@inlined
 def answer(
     resolved, origin, direction, march_prim, march_t, vertices, faces, t, prim_id, u, v, n_g
 ):
@@ -105,7 +98,6 @@ def answer(
         prim = simd.load_masked(march_prim, k, live, I32(-1))
         distance = simd.load_masked(march_t, k, live, F32(0.0))
         hit = prim >= I32(0)
-        at = (simd.iota() + I32(k)) * I32(3)
         face = prim * I32(3)
         ax, ay, az = vertex(vertices, faces, face, 0, hit)
         bx, by, bz = vertex(vertices, faces, face, 1, hit)
@@ -115,18 +107,21 @@ def answer(
         nx, ny, nz = e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x
         inv = 1.0 / (nx * nx + ny * ny + nz * nz)
         along = simd.to_f64(distance)
-        qx = point(origin, direction, at, 0, along, hit) - ax
-        qy = point(origin, direction, at, 1, along, hit) - ay
-        qz = point(origin, direction, at, 2, along, hit) - az
+        ox, oy, oz = simd.load_triples(origin, 3 * k, n - k)
+        dx, dy, dz = simd.load_triples(direction, 3 * k, n - k)
+        qx = simd.to_f64(ox) + along * simd.to_f64(dx) - ax
+        qy = simd.to_f64(oy) + along * simd.to_f64(dy) - ay
+        qz = simd.to_f64(oz) + along * simd.to_f64(dz) - az
         uu = (qy * e2z - qz * e2y) * nx + (qz * e2x - qx * e2z) * ny + (qx * e2y - qy * e2x) * nz
         vv = (e1y * qz - e1z * qy) * nx + (e1z * qx - e1x * qz) * ny + (e1x * qy - e1y * qx) * nz
         simd.store_masked(t, k, distance, live)
         simd.store_masked(prim_id, k, prim, live)
         simd.store_masked(u, k, simd.to_f32(simd.select(hit, uu * inv, 0.0)), live)
         simd.store_masked(v, k, simd.to_f32(simd.select(hit, vv * inv, 0.0)), live)
-        simd.scatter(n_g, at, simd.to_f32(simd.select(hit, nx, 0.0)), live)
-        simd.scatter(n_g, at + I32(1), simd.to_f32(simd.select(hit, ny, 0.0)), live)
-        simd.scatter(n_g, at + I32(2), simd.to_f32(simd.select(hit, nz, 0.0)), live)
+        simd.store_triples(
+            n_g, 3 * k, simd.to_f32(simd.select(hit, nx, 0.0)),
+            simd.to_f32(simd.select(hit, ny, 0.0)), simd.to_f32(simd.select(hit, nz, 0.0)), live,
+        )  # fmt: skip
 
 
 @parallel_kernel
