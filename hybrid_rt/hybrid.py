@@ -85,7 +85,7 @@ def trace_hybrid(
     Notes
     -----
     Unresolved rays are traced in their order, so that neighbours stay neighbours; in mode
-    "certified" from where the march has proven them free (`hybrid_rt.kernels.hybrid.handed_over`).
+    "certified" from where the march has proven them free (`hybrid_rt.kernels.hybrid.hand_over`).
     "compaction" makes a list of them, "fallback" writes their hits into their rows of the result,
     and "merge" those of the others. `timings` holds wall-clock seconds, without JIT compilation
     only from the second call on.
@@ -197,7 +197,7 @@ def _in_stages(
     clock.append(time.perf_counter())
     with _threads.limited(threads) as workers:
         indices = _unresolved(marched)
-        t_near = None if reach is None else _handed_over(rays, marched, indices, reach)
+        t_near = None if reach is None else _handed_over(rays, marched, reach)
         clock.append(time.perf_counter())
         answers = trace(indices, t_near)
         clock.append(time.perf_counter())
@@ -216,11 +216,17 @@ def _unresolved(marched: Marched) -> I32:
     return indices
 
 
-def _handed_over(rays: Rays, marched: Marched, indices: I32, reach: float) -> F32:
-    """Return a t_near, (N,) float32, that is set only for the rays at `indices`."""
+def _handed_over(rays: Rays, marched: Marched, reach: float) -> F32:
+    """Return a t_near, (N,) float32, that is set only for unresolved rays."""
     t_near = np.empty(len(rays), np.float32)
     kernels.hand_over(
-        indices, rays.origin, rays.direction, rays.t_near, marched.t_free, reach, t_near
+        marched.resolved,
+        rays.origin,
+        rays.direction,
+        rays.t_near,
+        marched.t_free,
+        reach,
+        t_near,
     )
     return t_near
 

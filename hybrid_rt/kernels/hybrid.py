@@ -14,34 +14,22 @@ CHUNK = 4096  # rays counted together
 F32, I32 = np.float32, np.int32
 
 
+@inlined
+def unresolved(resolved, i, end):
+    """Return the mask of the rays from i on, before `end`, that are not resolved."""
+    return ~simd.load_masked(resolved, i, simd.first(end - i), True)
+
+
 @parallel_kernel
 def count_unresolved(resolved, counts):
     """Count the unresolved rays of each chunk; resolved (N,) bool, counts (chunks,) int64."""
     n = resolved.shape[0]
     for chunk in prange(counts.shape[0]):
         count = 0
-        for i in range(chunk * CHUNK, min(n, (chunk + 1) * CHUNK)):
-            if not resolved[i]:
-                count += 1
+        end = min(n, (chunk + 1) * CHUNK)
+        for i in range(chunk * CHUNK, end, simd.WIDTH):
+            count += simd.count(unresolved(resolved, i, end))
         counts[chunk] = count
-
-
-HAND_OVER_BACK = 1.0 - 2.0**-8
-HAND_OVER_REACH = 2.0**-16
-
-
-@inlined
-def handed_over(i, origin, direction, t_free, reach):
-    """Return where a tracer in float32 has to start on a ray that is proven free up to t_free.
-
-    The tracer's own t errs, by 3e-7 of t on ordinary triangles and, on large ones that are seen at
-    a grazing angle, by as much of the scene's `reach` over the sine: a hit just behind t_free must
-    not be rejected for it. The first term gives up 0.4 % of what hand-over saves; the second,
-    1.5e-5 of the scene, covers that error down to a quarter of a degree.
-    """
-    o = max(abs(origin[i, 0]), abs(origin[i, 1]), abs(origin[i, 2]))
-    d = max(abs(direction[i, 0]), abs(direction[i, 1]), abs(direction[i, 2]))
-    return t_free[i] * HAND_OVER_BACK - HAND_OVER_REACH * (o + reach) / d
 
 
 @parallel_kernel
@@ -50,24 +38,51 @@ def list_unresolved(resolved, starts, indices):
     n = resolved.shape[0]
     for chunk in prange(starts.shape[0]):
         j = starts[chunk]
-        for i in range(chunk * CHUNK, min(n, (chunk + 1) * CHUNK)):
-            if not resolved[i]:
-                indices[j] = i
-                j += 1
+        end = min(n, (chunk + 1) * CHUNK)
+        for i in range(chunk * CHUNK, end, simd.WIDTH):
+            rest = unresolved(resolved, i, end)
+            count = simd.count(rest)
+            here = simd.compress(simd.iota() + I32(i), rest)
+            simd.store_masked(indices, j, here, simd.first(count))
+            j += count
+
+
+HAND_OVER_BACK = 1.0 - 2.0**-8
+HAND_OVER_REACH = 2.0**-16
+
+
+@inlined
+def longest(vectors, i, end):
+    """Return the largest coordinates of the vectors from i on, before `end`, in float64."""
+    x, y, z = simd.load_triples(vectors, 3 * i, end - i)
+    largest = simd.maximum(simd.absolute(x), simd.absolute(y))
+    return simd.to_f64(simd.maximum(largest, simd.absolute(z)))
 
 
 @parallel_kernel
-def hand_over(indices, origin, direction, t_near, t_free, reach, starts):
-    """Write from where the rays at `indices` are no longer known to be free; starts (N,) float32.
+def hand_over(resolved, origin, direction, t_near, t_free, reach, starts):
+    """Write where a tracer in float32 has to start on rays that are proven free up to t_free.
 
-    The other rows are left as they are.
+    starts (N,) float32 is written for the unresolved rays: never less than t_near.
+
+    The tracer's own t errs, by 3e-7 of t on ordinary triangles and, on large ones that are seen at
+    a grazing angle, by as much of the scene's `reach` over the sine: a hit just behind t_free must
+    not be rejected for it. The first term gives up 0.4 % of what hand-over saves; the second,
+    1.5e-5 of the scene, covers that error down to a quarter of a degree.
     """
-    for k in prange(indices.shape[0]):
-        i = indices[k]
-        starts[i] = t_near[i]
-        start = handed_over(i, origin, direction, t_free, reach)
-        if start > t_near[i]:  # false for the NaN of a ray without direction
-            starts[i] = start
+    n = resolved.shape[0]
+    for chunk in prange((n + CHUNK - 1) // CHUNK):
+        end = min(n, (chunk + 1) * CHUNK)
+        for i in range(chunk * CHUNK, end, simd.WIDTH):
+            rest = unresolved(resolved, i, end)
+            if simd.any_(rest):
+                far = simd.to_f64(simd.load_masked(t_free, i, rest, 0.0)) * HAND_OVER_BACK
+                slack = HAND_OVER_REACH * (longest(origin, i, end) + reach)
+                start = far - slack / longest(direction, i, end)
+                near = simd.load_masked(t_near, i, rest, 0.0)
+                # False for the NaN of a ray without direction.
+                later = start > simd.to_f64(near)
+                simd.store_masked(starts, i, simd.select(later, simd.to_f32(start), near), rest)
 
 
 @inlined
