@@ -19,9 +19,11 @@ from llvmlite import ir
 from numba import prange, types
 from numba.extending import intrinsic
 
+from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._aligned import aligned
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
 from hybrid_rt.kernels._queue import fetch_add
+from hybrid_rt.kernels.simd import WIDTH
 
 SCALE = 21
 FIELDS = 22
@@ -149,13 +151,19 @@ def _take(start, stop, indexed, indices, by_direction, direction, queue, keys, e
 
 @inlined
 def _load(
-    first, count, width, queue, origin, direction, t_near, t_far, packet, words, valid
+    first, count, width, in_order, queue, origin, direction, t_near, t_far, packet, words, valid
 ):  # fmt: skip
     """Fill a packet from place `first` of the queue on; return whether any of its lanes is valid.
 
     No row like ``origin[i]`` is formed, here or in any loop over rays: Numba counts references to
     it, in atomic steps that took twice as long as all the rest.
     """
+    if width == WIDTH and in_order:
+        done, some = _load_vectors(
+            queue[first], count - first, origin, direction, t_near, t_far, packet, words, valid
+        )
+        if done:
+            return some
     some = False
     for k in range(width):
         i = np.uint64(queue[min(first + k, count - 1)])  # unsigned spares the test for < 0
@@ -183,9 +191,67 @@ def _load(
 
 
 @inlined
-def _store(first, count, width, queue, packet, words, t, prim_id, u, v, n_g):
+def _finite(v):
+    return simd.absolute(v) <= LARGEST
+
+
+@inlined
+def _load_vectors(i, n, origin, direction, t_near, t_far, packet, words, valid):
+    """Do what `_load` does for WIDTH rays side by side, of which there are n from i on.
+
+    Return whether it is done, and whether a lane is valid. It is not done where a direction needs a
+    factor. Rays that do not lie side by side would be gathered, and that takes longer than reading
+    one after the other.
+    """
+    live = simd.first(n)
+    ox, oy, oz = simd.load_triples(origin, 3 * i, n)
+    dx, dy, dz = simd.load_triples(direction, 3 * i, n)
+    near = simd.load_masked(t_near, i, live, 0.0)
+    far = simd.load_masked(t_far, i, live, 0.0)
+    largest = simd.maximum(simd.absolute(dx), simd.absolute(dy))
+    largest = simd.maximum(largest, simd.absolute(dz))
+    usable = live & _finite(ox) & _finite(oy) & _finite(oz) & _finite(near) & (near <= far)
+    usable = usable & _finite(dx) & _finite(dy) & _finite(dz)
+    plain = (largest >= SHORT) & (largest <= LONG)
+    if simd.any_(usable & ~plain):
+        return False, False
+    simd.store(valid, 0, -simd.to_i32(usable))
+    simd.store(packet, 0, simd.select(usable, ox, 0.0))
+    simd.store(packet, WIDTH, simd.select(usable, oy, 0.0))
+    simd.store(packet, 2 * WIDTH, simd.select(usable, oz, 0.0))
+    simd.store(packet, 3 * WIDTH, simd.select(usable, near, 0.0))
+    simd.store(packet, 4 * WIDTH, simd.select(usable, dx, 0.0))
+    simd.store(packet, 5 * WIDTH, simd.select(usable, dy, 0.0))
+    simd.store(packet, 6 * WIDTH, simd.select(usable, dz, 0.0))
+    simd.store(packet, 8 * WIDTH, simd.select(usable, far, 0.0))
+    simd.store(packet, SCALE * WIDTH, simd.f32(1.0))
+    simd.store(words, 18 * WIDTH, simd.i32(-1))
+    return True, simd.any_(usable)
+
+
+@inlined
+def _store_vectors(i, n, packet, words, t, prim_id, u, v, n_g):
+    """Do what `_store` does for WIDTH rays side by side, of which there are n from i on."""
+    live = simd.first(n)
+    hit = simd.load(words, 18 * WIDTH) == 0
+    distance = simd.load(packet, 8 * WIDTH) * simd.load(packet, SCALE * WIDTH)
+    simd.store_masked(t, i, simd.select(hit, distance, np.inf), live)
+    simd.store_masked(prim_id, i, simd.select(hit, simd.load(words, 17 * WIDTH), -1), live)
+    simd.store_masked(u, i, simd.select(hit, simd.load(packet, 15 * WIDTH), 0.0), live)
+    simd.store_masked(v, i, simd.select(hit, simd.load(packet, 16 * WIDTH), 0.0), live)
+    x = simd.select(hit, simd.load(packet, 12 * WIDTH), 0.0)
+    y = simd.select(hit, simd.load(packet, 13 * WIDTH), 0.0)
+    z = simd.select(hit, simd.load(packet, 14 * WIDTH), 0.0)
+    simd.store_triples(n_g, 3 * i, x, y, z, live)
+
+
+@inlined
+def _store(first, count, width, in_order, queue, packet, words, t, prim_id, u, v, n_g):
     """Write the hits of a packet; what Embree left in the fields of a miss is not looked at."""
     nothing = np.float32(0.0)
+    if width == WIDTH and in_order:
+        _store_vectors(queue[first], count - first, packet, words, t, prim_id, u, v, n_g)
+        return
     for k in range(width):
         if first + k >= count:
             break
@@ -223,6 +289,7 @@ def intersect(
     costs a fraction of a chunk of foliage; which thread traces a ray does not show.
     """
     count = len(indices) if indexed else len(origin)
+    in_order = not (indexed or by_direction)
     taken = np.zeros(1, np.int64)
     for _ in prange(workers):
         packet, words, valid = _packet(width)
@@ -235,11 +302,11 @@ def intersect(
             )
             for first in range(0, length, width):
                 if _load(
-                    first, length, width, queue,
+                    first, length, width, in_order, queue,
                     origin, direction, t_near, t_far, packet, words, valid,
                 ):  # fmt: skip
                     _query(function, scene, arguments, width, packet, valid)
-                _store(first, length, width, queue, packet, words, t, prim_id, u, v, n_g)
+                _store(first, length, width, in_order, queue, packet, words, t, prim_id, u, v, n_g)
             start = fetch_add(taken.ctypes.data, CHUNK)
 
 
@@ -251,6 +318,7 @@ def occluded(
 ):  # fmt: skip
     """Whether (N, 3) rays hit anything, by rtcOccluded1/4/8/16; arguments as in `intersect`."""
     count = len(indices) if indexed else len(origin)
+    in_order = not (indexed or by_direction)
     taken = np.zeros(1, np.int64)
     for _ in prange(workers):
         packet, words, valid = _packet(width)
@@ -263,7 +331,7 @@ def occluded(
             )
             for first in range(0, length, width):
                 if _load(
-                    first, length, width, queue,
+                    first, length, width, in_order, queue,
                     origin, direction, t_near, t_far, packet, words, valid,
                 ):  # fmt: skip
                     _query(function, scene, arguments, width, packet, valid)
