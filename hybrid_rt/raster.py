@@ -110,11 +110,16 @@ def rasterize(
 
 def _images(height: int, width: int) -> tuple[F32, F32, F32, I32]:
     """Return room for depth, ddx, ddy and prim_id: one block, which few pages need be found for."""
-    n = 4 * height * width
-    raw = np.empty(n + 16, np.float32)
+    block = _in_lines(4 * height * width).reshape(4, height, width)
+    depth, ddx, ddy = block[:3].view(np.float32)
+    return depth, ddx, ddy, block[3]
+
+
+def _in_lines(n: int) -> I32:
+    """Return room for n int32 that begins with a cache line."""
+    raw = np.empty(n + 16, np.int32)
     start = -raw.ctypes.data % 64 // 4
-    depth, ddx, ddy, last = raw[start : start + n].reshape(4, height, width)
-    return depth, ddx, ddy, last.view(np.int32)
+    return raw[start : start + n]
 
 
 def _draw(
@@ -153,7 +158,7 @@ def _draw(
         tile_start = np.empty(tiles + 1, np.int32)
         kernels.prefix_sums(n_records, counts, record_start, tile_start)
         records = int(record_start[-1])
-        ints = np.empty((records, kernels.RECORD_INTS), np.int32)
+        ints = _in_lines(records * kernels.RECORD_INTS).reshape(-1, kernels.RECORD_INTS)
         planes = ints.view(np.float64)
         bins = np.empty(entries, np.int64)
         kernels.fill_bins(
