@@ -35,13 +35,14 @@ TILE = 1 << TILE_BITS
 """Pixels along a side of a tile; they stay in the L1 cache (see `hybrid_rt.kernels.tiles`)."""
 RECORD_INTS, RECORD_FLOATS = 16, 8
 """A record is 64 bytes, read as int32 or as float64."""
-FACE, NEAREST, FARTHEST = 6, 7, 8
+FACE, FARTHEST, SLOPE_X, SLOPE_Y = 6, 7, 8, 9
 """Of int32, behind x0 y0 x1 y1 x2 y2 in sub-pixels, turning so that the inside is positive:
-prim_id, and the bits of the float32 depths of the nearest and the farthest vertex; NOTHING for the
-nearest if nothing is covered after all."""
-NOTHING = 0
+prim_id, and the bits in float32 of the depth of the farthest vertex, of ddx and of ddy."""
 PLANE = 5
 """Of float64: depth at the screen's centre, ddx, ddy."""
+NOTHING = 0
+"""In place of the bits of a nearest depth: the record covers nothing after all."""
+LARGEST = float(np.finfo(np.float32).max)
 HUGE = 1e300
 """Planes steeper than this would overflow while they are evaluated."""
 LANES, PLANE_LANES = 16, 8
@@ -168,8 +169,14 @@ def vertex(vertices, v, live):
 
 
 @inlined
+def stored(slope):
+    """Return the bits of slopes in float32; planes seen edge-on can be steeper than it holds."""
+    return simd.bits_i32(simd.to_f32(simd.minimum(simd.maximum(slope, -LARGEST), LARGEST)))
+
+
+@inlined
 def write_planes(vertices, faces, face, live, record, eye, frame, near, ints, planes):
-    """Write the depth planes of faces and the ranges of their vertices' depths to their records.
+    """Write the depth planes of faces to their records; return the bits of the nearest depths.
 
     With n = (b - a) x (c - a) and d = n . (a - eye), the ray eye + z r through a pixel, whose r has
     z_view = 1, meets the plane at z = d / (n . r). So depth = near / z = near (n . r) / d, linear
@@ -178,7 +185,7 @@ def write_planes(vertices, faces, face, live, record, eye, frame, near, ints, pl
     screen's centre as the reference keeps the sum free of large terms that cancel. The rows of
     `frame` are right / f, -up / f and forward.
 
-    A plane through the eye covers nothing.
+    A plane through the eye covers nothing, and has `NOTHING` for its nearest depth.
     """
     v0, v1, v2 = vertices_of(face, live, faces)
     ax, ay, az = vertex(vertices, v0, live)
@@ -209,8 +216,10 @@ def write_planes(vertices, faces, face, live, record, eye, frame, near, ints, pl
     simd.scatter(planes, at + 2, ddy, live)
     at = record * RECORD_INTS
     simd.scatter(ints, at + FACE, face, live)
-    simd.scatter(ints, at + NEAREST, nearest, live)
     simd.scatter(ints, at + FARTHEST, simd.bits_i32(farthest), live)
+    simd.scatter(ints, at + SLOPE_X, stored(ddx), live)
+    simd.scatter(ints, at + SLOPE_Y, stored(ddy), live)
+    return nearest
 
 
 @inlined
@@ -437,13 +446,19 @@ def write_corners(record, x0, y0, x1, y1, x2, y2, ints):
 
 
 @inlined
-def write_records(chosen, places, count, vertices, faces, eye, frame, near, ints, planes):
-    """Write all of the records but their corners: faces `chosen` to `places`, (LANES,) int32."""
+def write_records(
+    chosen, places, count, vertices, faces, eye, frame, near, ints, planes, nearest
+):  # fmt: skip
+    """Write all of the records but their corners: faces `chosen` to `places`, (LANES,) int32.
+
+    nearest (LANES,) int32 comes out: the bits of the depths of the nearest vertices.
+    """
     for k in range(0, LANES, PLANE_LANES):
-        write_planes(
+        found = write_planes(
             vertices, faces, simd.load(chosen, k, PLANE_LANES), simd.first(count - k, PLANE_LANES),
             simd.load(places, k, PLANE_LANES), eye, frame, near, ints, planes,
         )  # fmt: skip
+        simd.store(nearest, k, found)
 
 
 @parallel_kernel
@@ -463,6 +478,7 @@ def fill_bins(
         screen = np.empty(SCREEN_ROWS * LANES, np.int32)
         chosen = np.zeros(LANES, np.int32)
         places = np.zeros(LANES, np.int32)
+        nearest = np.zeros(LANES, np.int32)
         for c in range(worker, len(cursors), workers):
             cursor = cursors[c]
             record = record_start[c]
@@ -481,8 +497,9 @@ def fill_bins(
                     v0, v1, v2 = vertices_of(simd.load(chosen, 0, LANES), live, faces)
                     to_screen(v0, v1, v2, live, xy, width, height, screen)
                     write_records(
-                        chosen, places, count, vertices, faces, eye, frame, near, ints, planes
-                    )
+                        chosen, places, count, vertices, faces, eye, frame, near, ints, planes,
+                        nearest,
+                    )  # fmt: skip
                     for k in range(count):
                         place = places[k]
                         write_corners(
@@ -490,9 +507,7 @@ def fill_bins(
                             screen[3 * LANES + k], screen[4 * LANES + k],
                             screen[5 * LANES + k], ints,
                         )  # fmt: skip
-                        bin_lane(
-                            k, screen, tiles_x, entry(ints[place, NEAREST], place), cursor, bins
-                        )
+                        bin_lane(k, screen, tiles_x, entry(nearest[k], place), cursor, bins)
                     continue
                 face = ~survivors[s]
                 s += 1
@@ -507,11 +522,12 @@ def fill_bins(
                         chosen[0] = face
                         places[0] = record
                         write_records(
-                            chosen, places, 1, vertices, faces, eye, frame, near, ints, planes
-                        )
+                            chosen, places, 1, vertices, faces, eye, frame, near, ints, planes,
+                            nearest,
+                        )  # fmt: skip
                         write_corners(record, x0, y0, x1, y1, x2, y2, ints)
                         bin_triangle(
                             x0, y0, x1, y1, x2, y2, i0, j0, i1, j1, tiles_x,
-                            entry(ints[record, NEAREST], record), cursor, bins,
+                            entry(nearest[0], record), cursor, bins,
                         )  # fmt: skip
                         record += 1

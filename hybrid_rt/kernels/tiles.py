@@ -21,11 +21,11 @@ from hybrid_rt.kernels.raster import (
     FACE,
     FARTHEST,
     LANES,
-    NEAREST,
     NOTHING,
     PLANE,
-    RECORD_FLOATS,
     RECORD_INTS,
+    SLOPE_X,
+    SLOPE_Y,
     TILE,
     TILE_BITS,
     centres,
@@ -37,7 +37,6 @@ tile's row."""
 STRIDE = TILE + LANES
 """Pixels in a row of a tile; narrow records run over its right end."""
 
-LARGEST = float(np.finfo(np.float32).max)
 NOBODY = -1
 """Owner of a pixel that shows nothing yet, or what an earlier batch has drawn."""
 COLUMN_0, ROW_0, COLUMN_1, ROW_1, EDGE_A, EDGE_B, EDGE_C, SETUP_ROWS = 0, 1, 2, 3, 4, 7, 10, 13
@@ -86,7 +85,7 @@ def set_up(chosen, count, ints, left, top, columns, rows, setup):
 
     (left, top) is the first pixel of the tile; columns, rows: of its pixels.
     """
-    records = simd.load(chosen, 0, LANES)
+    records = simd.to_i32(simd.load(chosen, 0, LANES))
     live = simd.first(count, LANES)
     x0, y0 = corner(records, 0, ints, live, left, top)
     x1, y1 = corner(records, 1, ints, live, left, top)
@@ -140,7 +139,7 @@ def draw_column(
 
 
 @inlined
-def draw(record, lane, setup, ints, planes, x, y, depths, owners):
+def draw(entry, lane, setup, ints, planes, x, y, depths, owners):
     """Rasterise a record that is set up in a lane into a tile's depths and owners.
 
     The tile's first pixel is at (x, y) from the screen's centre.
@@ -155,9 +154,10 @@ def draw(record, lane, setup, ints, planes, x, y, depths, owners):
     c0 = setup[EDGE_C * LANES + lane]
     c1 = setup[(EDGE_C + 1) * LANES + lane]
     c2 = setup[(EDGE_C + 2) * LANES + lane]
+    record = entry & 0xFFFFFFFF
     plane = (
         planes[record, PLANE], planes[record, PLANE + 1], planes[record, PLANE + 2],
-        np.int32(ints[record, NEAREST]).view(np.float32),
+        np.int32(entry >> 32).view(np.float32),
         np.int32(ints[record, FARTHEST]).view(np.float32),
     )  # fmt: skip
     if i1 - i0 < NARROW:
@@ -189,7 +189,7 @@ def farthest_of(depths, columns, rows):
 
 @inlined
 def write_tile(
-    left, top, columns, rows, fresh, depths, owners, ints, planes, depth, ddx, ddy, prim_id
+    left, top, columns, rows, fresh, depths, owners, ints, depth, ddx, ddy, prim_id
 ):  # fmt: skip
     """Write the pixels of a tile that have something new, with `fresh` all of them."""
     for j in range(rows):
@@ -199,11 +199,8 @@ def write_tile(
             live = simd.first(columns - i, LANES)
             new = live & (owner != NOBODY)
             face = simd.gather(ints, owner * RECORD_INTS + FACE, new, -1)
-            # The plane of a triangle seen edge-on can be steeper than float32 holds.
-            slope_x = simd.gather(planes, owner * RECORD_FLOATS + (PLANE + 1), new, 0.0)
-            slope_x = simd.to_f32(simd.minimum(simd.maximum(slope_x, -LARGEST), LARGEST))
-            slope_y = simd.gather(planes, owner * RECORD_FLOATS + (PLANE + 2), new, 0.0)
-            slope_y = simd.to_f32(simd.minimum(simd.maximum(slope_y, -LARGEST), LARGEST))
+            slope_x = simd.float_of_bits(simd.gather(ints, owner * RECORD_INTS + SLOPE_X, new, 0))
+            slope_y = simd.float_of_bits(simd.gather(ints, owner * RECORD_INTS + SLOPE_Y, new, 0))
             at = (top + j) * depth.shape[1] + left + i
             written = live if fresh else new
             if simd.all_(written):
@@ -241,7 +238,7 @@ def draw_tiles(
         owners = borrowed(pixels.view(np.int32)[TILE * STRIDE :])
         lanes = aligned(SETUP_ROWS * LANES // 2)
         setup = borrowed(lanes.view(np.int32))
-        chosen = np.zeros(LANES, np.int32)
+        chosen = np.zeros(LANES, np.int64)
         order = np.empty(most, np.int64)
         heads = np.empty(BUCKETS + 1, np.int32)
         tile = fetch_add(taken.ctypes.data, 1)
@@ -267,7 +264,7 @@ def draw_tiles(
                         entry = order[at]
                         at += 1
                         if entry >> 32 >= hidden:
-                            chosen[count] = entry & 0xFFFFFFFF
+                            chosen[count] = entry
                             count += 1
                     seen = set_up(chosen, count, ints, left, top, columns, rows, setup)
                     while seen != 0:
@@ -278,7 +275,7 @@ def draw_tiles(
                             top + 0.5 - cy, depths, owners,
                         )  # fmt: skip
                 write_tile(
-                    left, top, columns, rows, fresh, depths, owners, ints, planes,
+                    left, top, columns, rows, fresh, depths, owners, ints,
                     depth, ddx, ddy, prim_id,
                 )  # fmt: skip
             tile = fetch_add(taken.ctypes.data, 1)
