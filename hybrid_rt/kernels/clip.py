@@ -32,11 +32,9 @@ MAX_CORNERS = 8
 
 
 @inlined
-def to_screen(p0, p1, p2, eye, m):
-    """Return q = M (p - eye) of a world point."""
-    r0 = np.float64(p0) - eye[0]
-    r1 = np.float64(p1) - eye[1]
-    r2 = np.float64(p2) - eye[2]
+def project(p0, p1, p2, eye, m):
+    """Return q = M (p - eye) of a world point in float64, or of a vector of points."""
+    r0, r1, r2 = p0 - eye[0], p1 - eye[1], p2 - eye[2]
     return (
         m[0, 0] * r0 + m[0, 1] * r1 + m[0, 2] * r2,
         m[1, 0] * r0 + m[1, 1] * r1 + m[1, 2] * r2,
@@ -63,10 +61,7 @@ def transform_vertices(vertices, eye, m, width, height, near, xy):
         at = group * LANES
         live = simd.first(n - at, LANES)
         px, py, pz = simd.load_triples(vertices, 3 * at, n - at, LANES)
-        r0, r1, r2 = simd.to_f64(px) - eye[0], simd.to_f64(py) - eye[1], simd.to_f64(pz) - eye[2]
-        q0 = m[0, 0] * r0 + m[0, 1] * r1 + m[0, 2] * r2
-        q1 = m[1, 0] * r0 + m[1, 1] * r1 + m[1, 2] * r2
-        q2 = m[2, 0] * r0 + m[2, 1] * r1 + m[2, 2] * r2
+        q0, q1, q2 = project(simd.to_f64(px), simd.to_f64(py), simd.to_f64(pz), eye, m)
         # Written so that a NaN, which finite input cannot make, would be clipped away.
         front = q2 >= near
         x, y = q0 / q2, q1 / q2
@@ -151,9 +146,8 @@ def clip_triangle(vertices, faces, face, eye, m, near, q, spare, corners):
     """
     for k in range(3):
         v = faces[face, k]
-        q[k, 0], q[k, 1], q[k, 2] = to_screen(
-            vertices[v, 0], vertices[v, 1], vertices[v, 2], eye, m
-        )
+        x, y, z = vertices[v, 0], vertices[v, 1], vertices[v, 2]
+        q[k, 0], q[k, 1], q[k, 2] = project(np.float64(x), np.float64(y), np.float64(z), eye, m)
     n = 3
     for plane in range(5):
         n = clip_plane(plane, near, q, n, spare)

@@ -71,12 +71,6 @@ def highest(a, b, c, i0, j0, i1, j1):
 
 
 @inlined
-def lowest(a, b, c, i0, j0, i1, j1):
-    """Return the smallest value of an edge function over pixels i0..i1, j0..j1."""
-    return c + a * (i0 if a > 0 else i1) + b * (j0 if b > 0 else j1)
-
-
-@inlined
 def doubled_area(x0, y0, x1, y1, x2, y2):
     """Return twice the signed area of a snapped triangle in square sub-pixels."""
     return (np.int64(x1) - x0) * (np.int64(y2) - y0) - (np.int64(y1) - y0) * (np.int64(x2) - x0)
