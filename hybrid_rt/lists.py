@@ -7,7 +7,7 @@ import numpy as np
 from hybrid_rt import _threads
 from hybrid_rt.kernels import lists as kernels
 from hybrid_rt.kernels import lists_bins as bin_kernels
-from hybrid_rt.kernels.raster import prefix_sums
+from hybrid_rt.kernels.bins import TILE, prefix_sums
 from hybrid_rt.types import Camera, PrimitiveLists, Scene
 
 MARGIN_ULPS = 16
@@ -33,8 +33,8 @@ def primitive_lists(
     planes = np.zeros((len(faces), kernels.PLANE_ROW), np.float32)
     eye = np.array(camera.eye, np.float64)
     m, frame = camera.pixel_from_world, camera.world_from_pixel
-    tiles_x = -(-width // bin_kernels.TILE)
-    tiles = tiles_x * -(-height // bin_kernels.TILE)
+    tiles_x = -(-width // TILE)
+    tiles = tiles_x * -(-height // TILE)
     boxes = np.empty(len(vertices), np.int64)
     flags = np.empty(len(vertices), np.uint8)
     nearest_of = np.empty(len(vertices), np.float32)

@@ -8,9 +8,11 @@ import numpy as np
 
 from hybrid_rt import _check, _threads
 from hybrid_rt.errors import ArgumentError
-from hybrid_rt.kernels import clip as clip_kernels
-from hybrid_rt.kernels import raster as kernels
-from hybrid_rt.kernels import tiles as tile_kernels
+from hybrid_rt.kernels import tiles as kernels
+from hybrid_rt.kernels.bins import TILE, prefix_sums
+from hybrid_rt.kernels.clip import transform_vertices
+from hybrid_rt.kernels.cull import LANES, cull_and_count
+from hybrid_rt.kernels.records import ROW, fill_bins
 from hybrid_rt.lists import primitive_lists
 from hybrid_rt.types import F32, I32, Camera, GBuffer, Scene
 
@@ -103,7 +105,7 @@ def rasterize(
     with _threads.limited(threads) as workers:
         _draw(scene, camera, workers, depth, ddx, ddy, prim_id)
         if derivatives == "quad":
-            tile_kernels.quad_differences(depth, ddx, ddy)
+            kernels.quad_differences(depth, ddx, ddy)
     found = primitive_lists(scene, view, length, threads) if length else None
     return GBuffer(depth, ddx, ddy, prim_id, scene, camera, found)
 
@@ -132,21 +134,21 @@ def _draw(
     m = camera.pixel_from_world
     frame = camera.world_from_pixel
     xy = np.empty(len(vertices), np.int64)
-    clip_kernels.transform_vertices(vertices, eye, m, width, height, near, xy)
+    transform_vertices(vertices, eye, m, width, height, near, xy)
 
-    tiles_x = -(-width // kernels.TILE)
-    tiles = tiles_x * -(-height // kernels.TILE)
+    tiles_x = -(-width // TILE)
+    tiles = tiles_x * -(-height // TILE)
     size = min(len(faces), BATCH_FACES)
     first = 0
     while first < len(faces):
         last = min(first + size, len(faces))
         chunk = -(-(last - first) // CHUNKS)
         chunks = -(-(last - first) // chunk)
-        survivors = np.empty(last - first, np.int32)
+        survivors = np.empty((chunks, chunk + LANES), np.int32)
         n_survivors = np.empty(chunks, np.int32)
         n_records = np.empty(chunks, np.int32)
         counts = np.empty((chunks, tiles), np.int32)
-        kernels.cull_and_count(
+        cull_and_count(
             vertices, faces, first, last, eye, m, width, height, near, xy, tiles_x,
             workers, chunk, survivors, n_survivors, n_records, counts,
         )  # fmt: skip
@@ -156,17 +158,15 @@ def _draw(
             continue
         record_start = np.empty(chunks + 1, np.int32)
         tile_start = np.empty(tiles + 1, np.int32)
-        kernels.prefix_sums(n_records, counts, record_start, tile_start)
-        records = int(record_start[-1])
-        ints = _in_lines(records * kernels.RECORD_INTS).reshape(-1, kernels.RECORD_INTS)
-        planes = ints.view(np.float64)
+        prefix_sums(n_records, counts, record_start, tile_start)
+        records = _in_lines(2 * ROW * int(record_start[-1])).view(np.int64)
         bins = np.empty(entries, np.int64)
-        kernels.fill_bins(
-            vertices, faces, first, eye, m, frame, width, height, near, xy, tiles_x,
-            workers, chunk, survivors, n_survivors, record_start, counts, ints, planes, bins,
+        fill_bins(
+            vertices, faces, eye, m, frame, width, height, near, xy, tiles_x,
+            workers, survivors, n_survivors, record_start, counts, records, bins,
         )  # fmt: skip
-        tile_kernels.draw_tiles(
-            tile_start, bins, ints, planes, tiles_x, 0.5 * width, 0.5 * height, workers,
+        kernels.draw_tiles(
+            tile_start, bins, records, tiles_x, 0.5 * width, 0.5 * height, workers,
             first == 0, depth, ddx, ddy, prim_id,
         )  # fmt: skip
         first = last

@@ -2,7 +2,7 @@
 
 A vertex is ``q = M (p - eye)`` in float64: x_px = q0 / q2, y_px = q1 / q2, z_view = q2. Screen
 coordinates are snapped to 1/256 pixel. The guard band bounds them, so that every edge function of
-`hybrid_rt.kernels.raster` fits its integers; it is wide enough that clipping against it is rare.
+`hybrid_rt.kernels.bins` fits its integers; it is wide enough that clipping against it is rare.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ import numpy as np
 from numba import prange
 
 from hybrid_rt.kernels import simd
+from hybrid_rt.kernels._faces import place_of, vertices_of
 from hybrid_rt.kernels._jit import inlined, parallel_kernel
 from hybrid_rt.kernels._queue import fetch_add
 
@@ -86,17 +87,6 @@ def hand_over(resolved, origin, direction, t_near, t_free, reach, starts):
 
 
 @inlined
-def vertex(vertices, faces, face, corner, m):
-    """Return a corner of triangles, float64; face: 3 times their numbers, for lanes m."""
-    at = simd.gather(faces, face + I32(corner), m, I32(0)) * I32(3)
-    return (
-        simd.to_f64(simd.gather(vertices, at, m, F32(0.0))),
-        simd.to_f64(simd.gather(vertices, at + I32(1), m, F32(0.0))),
-        simd.to_f64(simd.gather(vertices, at + I32(2), m, F32(0.0))),
-    )
-
-
-@inlined
 def answer(
     resolved, origin, direction, march_prim, march_t, vertices, faces, t, prim_id, u, v, n_g
 ):
@@ -113,10 +103,10 @@ def answer(
         prim = simd.load_masked(march_prim, k, live, I32(-1))
         distance = simd.load_masked(march_t, k, live, F32(0.0))
         hit = prim >= I32(0)
-        face = prim * I32(3)
-        ax, ay, az = vertex(vertices, faces, face, 0, hit)
-        bx, by, bz = vertex(vertices, faces, face, 1, hit)
-        cx, cy, cz = vertex(vertices, faces, face, 2, hit)
+        a, b, c = vertices_of(faces, prim, hit)
+        ax, ay, az = place_of(vertices, a, hit)
+        bx, by, bz = place_of(vertices, b, hit)
+        cx, cy, cz = place_of(vertices, c, hit)
         e1x, e1y, e1z = bx - ax, by - ay, bz - az
         e2x, e2y, e2z = cx - ax, cy - ay, cz - az
         nx, ny, nz = e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x

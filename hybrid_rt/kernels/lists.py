@@ -46,7 +46,9 @@ from hybrid_rt.kernels._borrow import borrowed, keep
 from hybrid_rt.kernels._jit import inlined, parallel_kernel
 from hybrid_rt.kernels._order import BUCKETS, near_first
 from hybrid_rt.kernels._queue import fetch_add
-from hybrid_rt.kernels.lists_bins import LANES, SLACK, TILE, TILE_BITS, round_up, row
+from hybrid_rt.kernels._rows import transposed
+from hybrid_rt.kernels.bins import TILE, TILE_BITS
+from hybrid_rt.kernels.lists_bins import LANES, SLACK, round_up, row
 
 EDGE_ON = 1024.0
 """A plane whose distance from the eye is not certain to one part in a thousand has no slope."""
@@ -79,15 +81,6 @@ LINE = WHOLE * BLOCK_X
 FULL = np.int32(2**31 - 1)
 INVERSE = np.array([0] + [65536 // n + 1 for n in range(1, LANES + 1)], np.int32)
 """ t * INVERSE[n] >> 16 is t // n for t < LANES."""
-
-
-@inlined
-def transposed(a, b, c, d, e, f, g, h):
-    """Return eight vectors of LANES lanes as one, lane 0 of all of them first."""
-    return simd.interleave(
-        simd.interleave(simd.interleave(a, e), simd.interleave(c, g)),
-        simd.interleave(simd.interleave(b, f), simd.interleave(d, h)),
-    )
 
 
 @inlined

@@ -14,9 +14,7 @@ from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._jit import inlined, parallel_kernel
 from hybrid_rt.kernels._order import entry
 from hybrid_rt.kernels._queue import fetch_add
-
-TILE_BITS = 5
-TILE = 1 << TILE_BITS
+from hybrid_rt.kernels.bins import TILE_BITS
 
 SLACK = 2.0**-48
 """Relative error of sums of three products, 32 e; see `hybrid_rt.kernels.lists`."""
@@ -157,7 +155,7 @@ def cull_and_count(
 def fill_bins(records, n_survivors, tiles_x, workers, chunk, cursors, bins):
     """Note the survivors, by their places, in every tile of their box.
 
-    cursors (chunks, tiles) int32, made of the counts by `hybrid_rt.kernels.raster.prefix_sums`, are
+    cursors (chunks, tiles) int32, made of the counts by `hybrid_rt.kernels.bins.prefix_sums`, are
     advanced; bins (entries,) int64, see `hybrid_rt.kernels._order`.
     """
     taken = np.zeros(1, np.int64)

@@ -16,20 +16,10 @@ from hybrid_rt.kernels._borrow import borrowed, keep
 from hybrid_rt.kernels._jit import inlined, parallel_kernel
 from hybrid_rt.kernels._order import BUCKETS, near_first
 from hybrid_rt.kernels._queue import fetch_add
+from hybrid_rt.kernels.bins import TILE, TILE_BITS
 from hybrid_rt.kernels.clip import HALF, ONE, SUBPIXEL_BITS
-from hybrid_rt.kernels.raster import (
-    FACE,
-    FARTHEST,
-    LANES,
-    NOTHING,
-    PLANE,
-    RECORD_INTS,
-    SLOPE_X,
-    SLOPE_Y,
-    TILE,
-    TILE_BITS,
-    centres,
-)
+from hybrid_rt.kernels.cull import LANES, centres
+from hybrid_rt.kernels.records import FACE, FARTHEST, NOTHING, PLANE, ROW, SLOPE_X, SLOPE_Y
 
 NARROW = 8
 """Records no wider than this are drawn so many pixels at a time, others LANES, an aligned half of a
@@ -48,7 +38,7 @@ drawn, and the three edges as functions of a pixel, from the first on."""
 def tile_edge(ax, ay, bx, by, i0, j0, i1, j1):
     """Return A, B, value at (i0, j0) of edges a -> b in int32, and are their boxes outside of them.
 
-    Pixel (i, j) is inside where A i + B j + C >= 0, as in `raster.edge`; coordinates are float64,
+    Pixel (i, j) is inside where A i + B j + C >= 0, as in `bins.edge`; coordinates are float64,
     which holds all products: they are less than 2^50. An edge that its whole box is inside of is
     (0, 0, 0): always passed. Any other straddles the box, so its values stay below
     31 (|A| + |B|) < 2^31, as the guard band allows.
@@ -70,26 +60,26 @@ def tile_edge(ax, ay, bx, by, i0, j0, i1, j1):
 
 
 @inlined
-def corner(records, k, ints, live, left, top):
+def corner(number, k, records, live, left, top):
     """Return x and y of corner k of records, in sub-pixels from the first pixel of a tile."""
-    at = records * RECORD_INTS + 2 * k
+    both = simd.gather(records, number * ROW + k, live, 0)
     return (
-        simd.gather(ints, at, live, 0) - np.int32(left << SUBPIXEL_BITS),
-        simd.gather(ints, at + 1, live, 0) - np.int32(top << SUBPIXEL_BITS),
+        simd.to_i32(both) - np.int32(left << SUBPIXEL_BITS),
+        simd.to_i32(both >> 32) - np.int32(top << SUBPIXEL_BITS),
     )
 
 
 @inlined
-def set_up(chosen, count, ints, left, top, columns, rows, setup):
+def set_up(chosen, count, records, left, top, columns, rows, setup):
     """Fill `setup` for the first records of `chosen`, LANES at most; return the bits of those seen.
 
     (left, top) is the first pixel of the tile; columns, rows: of its pixels.
     """
-    records = simd.to_i32(simd.load(chosen, 0, LANES))
+    number = simd.to_i32(simd.load(chosen, 0, LANES))
     live = simd.first(count, LANES)
-    x0, y0 = corner(records, 0, ints, live, left, top)
-    x1, y1 = corner(records, 1, ints, live, left, top)
-    x2, y2 = corner(records, 2, ints, live, left, top)
+    x0, y0 = corner(number, 0, records, live, left, top)
+    x1, y1 = corner(number, 1, records, live, left, top)
+    x2, y2 = corner(number, 2, records, live, left, top)
     i0, i1 = centres(x0, x1, x2, columns - 1)
     j0, j1 = centres(y0, y1, y2, rows - 1)
     narrow = i1 - i0 < NARROW
@@ -139,7 +129,7 @@ def draw_column(
 
 
 @inlined
-def draw(entry, lane, setup, ints, planes, x, y, depths, owners):
+def draw(entry, lane, setup, records, planes, x, y, depths, owners):
     """Rasterise a record that is set up in a lane into a tile's depths and owners.
 
     The tile's first pixel is at (x, y) from the screen's centre.
@@ -155,10 +145,11 @@ def draw(entry, lane, setup, ints, planes, x, y, depths, owners):
     c1 = setup[(EDGE_C + 1) * LANES + lane]
     c2 = setup[(EDGE_C + 2) * LANES + lane]
     record = entry & 0xFFFFFFFF
+    at = record * ROW
     plane = (
-        planes[record, PLANE], planes[record, PLANE + 1], planes[record, PLANE + 2],
+        planes[at + PLANE], planes[at + PLANE + 1], planes[at + PLANE + 2],
         np.int32(entry >> 32).view(np.float32),
-        np.int32(ints[record, FARTHEST]).view(np.float32),
+        np.int32(records[at + FARTHEST] >> 32).view(np.float32),
     )  # fmt: skip
     if i1 - i0 < NARROW:
         draw_column(
@@ -198,9 +189,10 @@ def write_tile(
             owner = simd.load(owners, j * STRIDE + i, LANES)
             live = simd.first(columns - i, LANES)
             new = live & (owner != NOBODY)
-            face = simd.gather(ints, owner * RECORD_INTS + FACE, new, -1)
-            slope_x = simd.float_of_bits(simd.gather(ints, owner * RECORD_INTS + SLOPE_X, new, 0))
-            slope_y = simd.float_of_bits(simd.gather(ints, owner * RECORD_INTS + SLOPE_Y, new, 0))
+            record = owner * (2 * ROW)
+            face = simd.gather(ints, record + FACE, new, -1)
+            slope_x = simd.float_of_bits(simd.gather(ints, record + SLOPE_X, new, 0))
+            slope_y = simd.float_of_bits(simd.gather(ints, record + SLOPE_Y, new, 0))
             at = (top + j) * depth.shape[1] + left + i
             written = live if fresh else new
             if simd.all_(written):
@@ -217,11 +209,11 @@ def write_tile(
 
 @parallel_kernel
 def draw_tiles(
-    tile_start, bins, ints, planes, tiles_x, cx, cy, workers, fresh, depth, ddx, ddy, prim_id
+    tile_start, bins, records, tiles_x, cx, cy, workers, fresh, depth, ddx, ddy, prim_id
 ):  # fmt: skip
     """Draw every bin over what the images (H, W) already hold; (cx, cy) is the screen's centre.
 
-    Bins, ints and planes are those of `raster.fill_bins`. With `fresh` the images hold nothing yet,
+    Bins and records are those of `records.fill_bins`. With `fresh` the images hold nothing yet,
     and all pixels are written.
     """
     height, width = depth.shape
@@ -229,7 +221,8 @@ def draw_tiles(
     most = 0
     for tile in range(tiles):
         most = max(most, tile_start[tile + 1] - tile_start[tile])
-    ints, planes = borrowed(ints), borrowed(planes)
+    ints, planes = borrowed(records.view(np.int32)), borrowed(records.view(np.float64))
+    records = borrowed(records)
     depth, ddx, ddy, prim_id = borrowed(depth), borrowed(ddx), borrowed(ddy), borrowed(prim_id)
     taken = np.zeros(1, np.int64)
     for _ in prange(workers):
@@ -266,12 +259,12 @@ def draw_tiles(
                         if entry >> 32 >= hidden:
                             chosen[count] = entry
                             count += 1
-                    seen = set_up(chosen, count, ints, left, top, columns, rows, setup)
+                    seen = set_up(chosen, count, records, left, top, columns, rows, setup)
                     while seen != 0:
                         lane = simd.lowest(seen)
                         seen &= seen - 1
                         draw(
-                            chosen[lane], lane, setup, ints, planes, left + 0.5 - cx,
+                            chosen[lane], lane, setup, records, planes, left + 0.5 - cx,
                             top + 0.5 - cy, depths, owners,
                         )  # fmt: skip
                 write_tile(
