@@ -1,8 +1,9 @@
 """The second half of a tiled rasteriser: draw the bin of each tile, on its own and on one thread.
 
 The nearest record has a pixel, and among equals the first, so the order of drawing does not matter.
-Records are set up LANES at a time, then drawn one after the other, a vector of pixels at a time and
-without a branch on what is covered: guessing wrong costs more than a vector.
+Records are set up LANES at a time, which finds in which rows they can be seen. Then they are drawn
+one after the other, a vector of pixels at a time and without a branch on what is covered: guessing
+wrong costs more than a vector.
 """
 
 from __future__ import annotations
@@ -27,21 +28,27 @@ tile's row."""
 STRIDE = TILE + LANES
 """Pixels in a row of a tile; narrow records run over its right end."""
 
+HALVES, STRIP = 2, 8
+STRIPS = TILE // STRIP
+"""A tile is cut in blocks, aligned halves of STRIP rows, whose farthest depths are known."""
+
 NOBODY = -1
 """Owner of a pixel that shows nothing yet, or what an earlier batch has drawn."""
-COLUMN_0, ROW_0, COLUMN_1, ROW_1, EDGE_A, EDGE_B, EDGE_C, SETUP_ROWS = 0, 1, 2, 3, 4, 7, 10, 13
-"""What a set-up makes of records, a lane each: the first and the last pixel of the tile that is
-drawn, and the three edges as functions of a pixel, from the first on."""
+COLUMN, FIRST, LAST, EDGE_A, EDGE_B, EDGE_C, SETUP_ROWS = 0, 1, 3, 5, 8, 11, 14
+"""What a set-up makes of records, a lane each: the first column of narrow ones, `WIDE` of others;
+the first and the last row to be drawn, of narrow ones or of each half; the three edges, as
+functions of a pixel of the tile in integers that wrap around."""
+WIDE = -1
 
 
 @inlined
 def tile_edge(ax, ay, bx, by, i0, j0, i1, j1):
-    """Return A, B, value at (i0, j0) of edges a -> b in int32, and are their boxes outside of them.
+    """Return A, B, C of edges a -> b in int32, and the mask of those with their boxes outside.
 
     Pixel (i, j) is inside where A i + B j + C >= 0, as in `bins.edge`; coordinates are float64,
     which holds all products: they are less than 2^50. An edge that its whole box is inside of is
-    (0, 0, 0): always passed. Any other straddles the box, so its values stay below
-    31 (|A| + |B|) < 2^31, as the guard band allows.
+    (0, 0, 0): always passed. Any other straddles the box, so its values in the tile stay below
+    39 (|A| + |B|) < 2^31, as the guard band allows; that C wraps around does not matter.
     """
     a, b = ay - by, bx - ax
     top_left = (a > 0.0) | (a == 0.0) & (b > 0.0)
@@ -54,9 +61,40 @@ def tile_edge(ax, ay, bx, by, i0, j0, i1, j1):
     return (
         simd.select(inside, zero, simd.to_i32(a)),
         simd.select(inside, zero, simd.to_i32(b)),
-        simd.select(inside, zero, simd.to_i32(c + left + top)),
+        simd.select(inside, zero, simd.to_i32(simd.to_i64(c))),
         outside,
     )
+
+
+@inlined
+def highest_of(a, b, c, left, right):
+    """Return the highest value of edges in columns left..right of the first strip of a tile."""
+    return c + simd.maximum(a * left, a * right) + simd.maximum(b * np.int32(STRIP - 1), 0)
+
+
+@inlined
+def rows_of(e0, e1, e2, left, right, j0, j1, nearest, farthest, taken0, taken1):
+    """Return the first and the last row, of j0..j1, in the strips that records may be seen in.
+
+    e0, e1, e2: their edges; left, right: columns; taken0, taken1: whether these are in the left and
+    the right half, of whose strips `farthest` has the depths.
+    """
+    m0 = highest_of(e0[0], e0[1], e0[2], left, right)
+    m1 = highest_of(e1[0], e1[1], e1[2], left, right)
+    m2 = highest_of(e2[0], e2[1], e2[2], left, right)
+    step0, step1, step2 = e0[1] * np.int32(STRIP), e1[1] * np.int32(STRIP), e2[1] * np.int32(STRIP)
+    first, last = simd.i32(TILE, LANES), simd.i32(-1, LANES)
+    for strip in range(STRIPS):
+        top = np.int32(strip * STRIP)
+        bottom = np.int32(top + (STRIP - 1))
+        seen = (taken0 & (nearest >= farthest[strip])) | (
+            taken1 & (nearest >= farthest[STRIPS + strip])
+        )
+        seen = seen & ((m0 | m1 | m2) >= 0) & (j0 <= bottom) & (j1 >= top)
+        first = simd.select(seen, simd.minimum(first, simd.maximum(j0, top)), first)
+        last = simd.select(seen, simd.minimum(j1, bottom), last)
+        m0, m1, m2 = m0 + step0, m1 + step1, m2 + step2
+    return first, last
 
 
 @inlined
@@ -70,12 +108,14 @@ def corner(number, k, records, live, left, top):
 
 
 @inlined
-def set_up(chosen, count, records, left, top, columns, rows, setup):
+def set_up(chosen, count, records, left, top, columns, rows, farthest, setup):
     """Fill `setup` for the first records of `chosen`, LANES at most; return the bits of those seen.
 
-    (left, top) is the first pixel of the tile; columns, rows: of its pixels.
+    (left, top) is the first pixel of the tile; columns, rows: of its pixels; farthest: of its
+    blocks.
     """
-    number = simd.to_i32(simd.load(chosen, 0, LANES))
+    entries = simd.load(chosen, 0, LANES)
+    number, nearest = simd.to_i32(entries), simd.to_i32(entries >> 32)
     live = simd.first(count, LANES)
     x0, y0 = corner(number, 0, records, live, left, top)
     x1, y1 = corner(number, 1, records, live, left, top)
@@ -91,10 +131,21 @@ def set_up(chosen, count, records, left, top, columns, rows, setup):
     a0, b0, c0, out0 = tile_edge(x0, y0, x1, y1, u0, v0, u1, v1)
     a1, b1, c1, out1 = tile_edge(x1, y1, x2, y2, u0, v0, u1, v1)
     a2, b2, c2, out2 = tile_edge(x2, y2, x0, y0, u0, v0, u1, v1)
-    simd.store(setup, COLUMN_0 * LANES, i0)
-    simd.store(setup, ROW_0 * LANES, j0)
-    simd.store(setup, COLUMN_1 * LANES, i1)
-    simd.store(setup, ROW_1 * LANES, j1)
+    e0, e1, e2 = (a0, b0, c0), (a1, b1, c1), (a2, b2, c2)
+    # A narrow record is drawn in its own columns, whichever half they are in.
+    first0, last0 = rows_of(
+        e0, e1, e2, simd.select(narrow, i0, 0), simd.select(narrow, i1, LANES - 1), j0, j1,
+        nearest, farthest, i0 < LANES, narrow & (i1 >= LANES),
+    )  # fmt: skip
+    first1, last1 = rows_of(
+        e0, e1, e2, simd.i32(LANES, LANES), simd.i32(TILE - 1, LANES), j0, j1,
+        nearest, farthest, simd.mask(False, LANES), ~narrow & (i1 >= LANES),
+    )  # fmt: skip
+    simd.store(setup, COLUMN * LANES, simd.select(narrow, i0, WIDE))
+    simd.store(setup, FIRST * LANES, first0)
+    simd.store(setup, (FIRST + 1) * LANES, first1)
+    simd.store(setup, LAST * LANES, last0)
+    simd.store(setup, (LAST + 1) * LANES, last1)
     simd.store(setup, EDGE_A * LANES, a0)
     simd.store(setup, (EDGE_A + 1) * LANES, a1)
     simd.store(setup, (EDGE_A + 2) * LANES, a2)
@@ -104,19 +155,22 @@ def set_up(chosen, count, records, left, top, columns, rows, setup):
     simd.store(setup, EDGE_C * LANES, c0)
     simd.store(setup, (EDGE_C + 1) * LANES, c1)
     simd.store(setup, (EDGE_C + 2) * LANES, c2)
-    return simd.bits(live & ~(out0 | out1 | out2))
+    seen = (last0 >= first0) | (last1 >= first1)
+    return simd.bits(live & seen & ~(out0 | out1 | out2))
 
 
 @inlined
-def draw_column(
-    n, at, rows, a0, a1, a2, b0, b1, b2, c0, c1, c2, x, y, plane, record, depths, owners
-):  # fmt: skip
-    """Rasterise `rows` rows of n pixels from pixel `at` on, (x, y) from the screen's centre."""
+def draw_column(n, i, j, last, edges, x, y, plane, record, depths, owners):
+    """Rasterise rows j..last of n columns from i on; the tile begins at (x, y)."""
+    (a0, a1, a2), (b0, b1, b2), (c0, c1, c2) = edges
     centre, ddx, ddy, nearest, farthest = plane
-    edge0, edge1, edge2 = simd.iota(n) * a0 + c0, simd.iota(n) * a1 + c1, simd.iota(n) * a2 + c2
-    across = (simd.to_f64(simd.iota(n)) + x) * ddx
-    for j in range(rows):
-        exact = across + (centre + ddy * (j + y))
+    edge0 = simd.iota(n) * a0 + np.int32(c0 + a0 * i + b0 * j)
+    edge1 = simd.iota(n) * a1 + np.int32(c1 + a1 * i + b1 * j)
+    edge2 = simd.iota(n) * a2 + np.int32(c2 + a2 * i + b2 * j)
+    across = (simd.to_f64(simd.iota(n)) + (x + i)) * ddx
+    at = j * STRIDE + i
+    for row in range(j, last + 1):
+        exact = across + (centre + ddy * (row + y))
         depth = simd.maximum(simd.minimum(simd.to_f32(exact), nearest), farthest)
         old, owner = simd.load(depths, at, n), simd.load(owners, at, n)
         wins = (depth > old) | (depth == old) & (owner > record)
@@ -134,16 +188,14 @@ def draw(entry, lane, setup, records, planes, x, y, depths, owners):
 
     The tile's first pixel is at (x, y) from the screen's centre.
     """
-    i0 = np.int64(setup[COLUMN_0 * LANES + lane])
-    i1 = np.int64(setup[COLUMN_1 * LANES + lane])
-    j0 = np.int64(setup[ROW_0 * LANES + lane])
-    rows = setup[ROW_1 * LANES + lane] - j0 + 1
-    a0, b0 = setup[EDGE_A * LANES + lane], setup[EDGE_B * LANES + lane]
-    a1, b1 = setup[(EDGE_A + 1) * LANES + lane], setup[(EDGE_B + 1) * LANES + lane]
-    a2, b2 = setup[(EDGE_A + 2) * LANES + lane], setup[(EDGE_B + 2) * LANES + lane]
-    c0 = setup[EDGE_C * LANES + lane]
-    c1 = setup[(EDGE_C + 1) * LANES + lane]
-    c2 = setup[(EDGE_C + 2) * LANES + lane]
+    edges = (
+        (setup[EDGE_A * LANES + lane], setup[(EDGE_A + 1) * LANES + lane],
+         setup[(EDGE_A + 2) * LANES + lane]),
+        (setup[EDGE_B * LANES + lane], setup[(EDGE_B + 1) * LANES + lane],
+         setup[(EDGE_B + 2) * LANES + lane]),
+        (setup[EDGE_C * LANES + lane], setup[(EDGE_C + 1) * LANES + lane],
+         setup[(EDGE_C + 2) * LANES + lane]),
+    )  # fmt: skip
     record = entry & 0xFFFFFFFF
     at = record * ROW
     plane = (
@@ -151,31 +203,39 @@ def draw(entry, lane, setup, records, planes, x, y, depths, owners):
         np.int32(entry >> 32).view(np.float32),
         np.int32(records[at + FARTHEST] >> 32).view(np.float32),
     )  # fmt: skip
-    if i1 - i0 < NARROW:
-        draw_column(
-            NARROW, j0 * STRIDE + i0, rows, a0, a1, a2, b0, b1, b2, c0, c1, c2,
-            x + i0, y + j0, plane, record, depths, owners,
-        )  # fmt: skip
+    column = np.int64(setup[COLUMN * LANES + lane])
+    if column != WIDE:
+        first = np.int64(setup[FIRST * LANES + lane])
+        last = np.int64(setup[LAST * LANES + lane])
+        draw_column(NARROW, column, first, last, edges, x, y, plane, record, depths, owners)
         return
-    for i in range(0, i1 - i0 + 1, LANES):
-        draw_column(
-            LANES, j0 * STRIDE + i0 + i, rows, a0, a1, a2, b0, b1, b2,
-            np.int32(c0 + a0 * i), np.int32(c1 + a1 * i), np.int32(c2 + a2 * i),
-            x + (i0 + i), y + j0, plane, record, depths, owners,
-        )  # fmt: skip
+    for half in range(HALVES):
+        first = np.int64(setup[(FIRST + half) * LANES + lane])
+        last = np.int64(setup[(LAST + half) * LANES + lane])
+        if first <= last:
+            draw_column(
+                LANES, half * LANES, first, last, edges, x, y, plane, record, depths, owners
+            )
 
 
 @inlined
-def farthest_of(depths, columns, rows):
-    """Return the farthest depth of a tile, 0 if a pixel is still empty."""
-    farthest = simd.f32(np.inf, LANES)
-    for j in range(rows):
-        for i in range(0, columns, LANES):
-            here = simd.load(depths, j * STRIDE + i, LANES)
-            farthest = simd.minimum(
-                farthest, simd.select(simd.first(columns - i, LANES), here, np.inf)
-            )
-    return simd.reduce_min(farthest)
+def find_farthest(depths, columns, rows, farthest):
+    """Find the farthest depths of the blocks of a tile, 0 where a pixel is still empty.
+
+    farthest (HALVES * STRIPS,) int32, their bits, comes out; the farthest of all is returned.
+    """
+    least = np.int32(2**31 - 1)
+    for half in range(HALVES):
+        live = simd.first(columns - half * LANES, LANES)
+        for strip in range(STRIPS):
+            found = simd.f32(np.inf, LANES)
+            for j in range(strip * STRIP, min((strip + 1) * STRIP, rows)):
+                here = simd.load(depths, j * STRIDE + half * LANES, LANES)
+                found = simd.minimum(found, simd.select(live, here, np.inf))
+            depth = np.float32(simd.reduce_min(found)).view(np.int32)
+            farthest[half * STRIPS + strip] = depth
+            least = min(least, depth)
+    return least
 
 
 @inlined
@@ -230,6 +290,7 @@ def draw_tiles(
         depths = borrowed(pixels.view(np.float32)[: TILE * STRIDE])
         owners = borrowed(pixels.view(np.int32)[TILE * STRIDE :])
         lanes = aligned(SETUP_ROWS * LANES // 2)
+        farthest = np.empty(HALVES * STRIPS, np.int32)
         setup = borrowed(lanes.view(np.int32))
         chosen = np.zeros(LANES, np.int64)
         order = np.empty(most, np.int64)
@@ -250,8 +311,7 @@ def draw_tiles(
                 near_first(bins, start, end, order, heads)
                 at = np.int64(0)
                 while at < end - start:
-                    farthest = np.float32(farthest_of(depths, columns, rows))
-                    hidden = max(np.int64(farthest.view(np.int32)), NOTHING + 1)
+                    hidden = max(find_farthest(depths, columns, rows, farthest), NOTHING + 1)
                     count = 0
                     while count < LANES and at < end - start:
                         entry = order[at]
@@ -259,7 +319,7 @@ def draw_tiles(
                         if entry >> 32 >= hidden:
                             chosen[count] = entry
                             count += 1
-                    seen = set_up(chosen, count, records, left, top, columns, rows, setup)
+                    seen = set_up(chosen, count, records, left, top, columns, rows, farthest, setup)
                     while seen != 0:
                         lane = simd.lowest(seen)
                         seen &= seen - 1
