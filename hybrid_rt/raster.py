@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Literal
 
 import numpy as np
@@ -103,11 +104,11 @@ def rasterize(
         raise ArgumentError("lists_camera", "None where lists is 0", "a Camera")
     depth, ddx, ddy, prim_id = _images(camera.height, camera.width)
     with _threads.limited(threads) as workers:
-        _draw(scene, camera, workers, depth, ddx, ddy, prim_id)
+        timings = _draw(scene, camera, workers, depth, ddx, ddy, prim_id)
         if derivatives == "quad":
             kernels.quad_differences(depth, ddx, ddy)
     found = primitive_lists(scene, view, length, threads) if length else None
-    return GBuffer(depth, ddx, ddy, prim_id, scene, camera, found)
+    return GBuffer(depth, ddx, ddy, prim_id, scene, camera, found, timings)
 
 
 def _images(height: int, width: int) -> tuple[F32, F32, F32, I32]:
@@ -126,8 +127,17 @@ def _in_lines(n: int) -> I32:
 
 def _draw(
     scene: Scene, camera: Camera, workers: int, depth: F32, ddx: F32, ddy: F32, prim_id: I32
-) -> None:
-    """Draw all faces over the images, a batch at a time."""
+) -> dict[str, float]:
+    """Draw all faces over the images, a batch at a time; return the seconds of every stage."""
+    timings = dict.fromkeys(("vertices", "cull", "records", "tiles"), 0.0)
+    last_time = time.perf_counter()
+
+    def done(stage: str) -> None:
+        nonlocal last_time
+        now = time.perf_counter()
+        timings[stage] += now - last_time
+        last_time = now
+
     vertices, faces = scene.vertices, scene.faces
     width, height, near = camera.width, camera.height, float(camera.near)
     eye = np.array(camera.eye, np.float64)
@@ -135,6 +145,7 @@ def _draw(
     frame = camera.world_from_pixel
     xy = np.empty(len(vertices), np.int64)
     transform_vertices(vertices, eye, m, width, height, near, xy)
+    done("vertices")
 
     tiles_x = -(-width // TILE)
     tiles = tiles_x * -(-height // TILE)
@@ -153,6 +164,7 @@ def _draw(
             workers, chunk, survivors, n_survivors, n_records, counts,
         )  # fmt: skip
         entries = int(counts.sum(dtype=np.int64))
+        done("cull")
         if entries > BATCH_ENTRIES and size > 1:
             size = -(-size // 2)
             continue
@@ -165,8 +177,11 @@ def _draw(
             vertices, faces, eye, m, frame, width, height, near, xy, tiles_x,
             workers, survivors, n_survivors, record_start, counts, records, bins,
         )  # fmt: skip
+        done("records")
         kernels.draw_tiles(
             tile_start, bins, records, tiles_x, 0.5 * width, 0.5 * height, workers,
             first == 0, depth, ddx, ddy, prim_id,
         )  # fmt: skip
+        done("tiles")
         first = last
+    return timings

@@ -373,6 +373,10 @@ class GBuffer:
     camera : Camera
     lists : PrimitiveLists, optional
         What mode "certified" reads, if the rasteriser was asked for it.
+    timings : dict of str to float
+        Seconds of the stages of `rasterize`: "vertices" (projecting them), "cull" (which faces may
+        cover a pixel), "records" (their planes, and the tiles they are put into), "tiles" (drawing
+        these and writing the images); with JIT compilation in a first call.
     """
 
     depth: F32
@@ -382,6 +386,7 @@ class GBuffer:
     scene: Scene
     camera: Camera
     lists: PrimitiveLists | None = None
+    timings: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

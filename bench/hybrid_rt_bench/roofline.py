@@ -15,6 +15,10 @@ STAGES = ("embree", "march", "compaction", "fallback", "merge", "scalar", "start
 """What is timed in a round, seconds: Embree for all rays, the four stages of the hybrid (fallback
 is Embree for the rest), the march without vectors and a march of one step."""
 
+RASTER = ("vertices", "cull", "records", "tiles")
+"""Stages of the raster, as in `GBuffer.timings`; beside them are timed "raster", the whole, and
+"primary", the strongest Embree for the primary rays of the same view."""
+
 HYBRID = ("march", "compaction", "fallback", "merge")
 
 STRUCTURES = ("pyramid", "lists", "planes", "corners", "slots")

@@ -3,7 +3,8 @@
 Round after round, on one thread and on all of them: the strongest Embree traces all rays, the
 hybrid marches them and hands over the rest to the same Embree, the rays are marched without
 vectors, and a march of one step is timed, which is the set-up of every ray and the writing of its
-row. Ratios are taken inside a round.
+row. Beside it the raster draws the view, stage by stage, and the strongest Embree traces its
+primary rays. Ratios are taken inside a round.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import hybrid_rt as hrt
 from hybrid_rt.kernels import certified_simd as lanes
 from hybrid_rt_bench import roofline, stats, strongest
 from hybrid_rt_bench.measure import CellError, LoadedScene
+from hybrid_rt_bench.primary import primary_rays
 from hybrid_rt_bench.spec_roofline import RooflineExperiment
 
 Row = dict[str, Any]
@@ -76,9 +78,15 @@ def measure_cell(
         raise CellError(f"{name}: the camera sees no surface, so there are no mirror rays")
     choice = strongest.choose(loaded.candidates, rays, experiment.selection_rays)
     counts = thread_counts(threads)
+    primary = primary_rays(camera)
+    first_hit = strongest.choose(loaded.candidates, primary, experiment.selection_rays).best.tracer
     stages = [
-        _Stages(rays, gbuffer, pyramid, choice.best.tracer.with_path(threads=n), n) for n in counts
-    ]
+        _Stages(
+            rays, gbuffer, pyramid, choice.best.tracer.with_path(threads=n),
+            primary, first_hit.with_path(threads=n), n,
+        )
+        for n in counts
+    ]  # fmt: skip
     marched = stages[-1].hybrid().marched  # these are the first calls, which compile
     for each in stages:
         each.round(0)
@@ -115,6 +123,8 @@ class _Stages:
     gbuffer: hrt.GBuffer
     pyramid: hrt.DepthPyramid
     tracer: hrt.EmbreeTracer
+    primary: hrt.Rays
+    primary_tracer: hrt.EmbreeTracer
     threads: int
 
     def hybrid(self) -> hrt.HybridResult:
@@ -132,6 +142,10 @@ class _Stages:
             call()
             found[stage] = time.perf_counter() - start
 
+        def raster() -> None:
+            drawn = hrt.rasterize(self.gbuffer.scene, self.gbuffer.camera, threads=self.threads)
+            found.update(drawn.timings)
+
         def march(mode: hrt.Certified) -> hrt.Marched:
             return hrt.march(self.rays, self.gbuffer, self.pyramid, mode, threads=self.threads)
 
@@ -140,6 +154,8 @@ class _Stages:
             lambda: found.update(self.hybrid().timings),
             lambda: timed("scalar", lambda: march(SCALAR)),
             lambda: timed("start", lambda: march(START)),
+            lambda: timed("raster", raster),
+            lambda: timed("primary", lambda: self.primary_tracer.intersect(self.primary)),
         ]
         gc.collect()
         gc.disable()
@@ -148,7 +164,8 @@ class _Stages:
                 call()
         finally:
             gc.enable()
-        return {stage: found[stage] for stage in roofline.STAGES}
+        kept = (*roofline.STAGES, *roofline.RASTER, "raster", "primary")
+        return {stage: found[stage] for stage in kept}
 
 
 def work_columns(marched: hrt.Marched, gbuffer: hrt.GBuffer, pyramid: hrt.DepthPyramid) -> Row:
@@ -193,12 +210,16 @@ def work_columns(marched: hrt.Marched, gbuffer: hrt.GBuffer, pyramid: hrt.DepthP
 
 
 def time_columns(samples: list[Row], rays: int) -> Row:
-    """Return medians in nanoseconds a ray, and medians of the paired ratios."""
+    """Return medians in nanoseconds a ray, of the raster in ms, and of the paired ratios."""
     seconds = {stage: np.array([s[stage] for s in samples]) for stage in roofline.STAGES}
     seconds["budget"] = roofline.budget(seconds)
     row: Row = {}
     for stage, values in seconds.items():
         _put(row, f"{stage}_ns", stats.median(1e9 * values / rays))
+    for stage in (*roofline.RASTER, "raster", "primary"):
+        seconds[stage] = np.array([s[stage] for s in samples])
+        _put(row, f"{stage}_ms", stats.median(1e3 * seconds[stage]))
+    _put(row, "raster_speedup", stats.paired_ratio(seconds["primary"], seconds["raster"]))
     _put(row, "vectors_speedup", stats.paired_ratio(seconds["scalar"], seconds["march"]))
     hybrid = sum(seconds[stage] for stage in roofline.HYBRID)
     _put(row, "speedup", stats.paired_ratio(seconds["embree"], hybrid))

@@ -213,6 +213,14 @@ def test_times_are_medians_and_paired_ratios(record):
         assert row[f"{stage}_ns"] == pytest.approx(np.median(each))
     ratios = [s["scalar"] / s["march"] for s in found.samples]
     assert row["vectors_speedup"] == pytest.approx(np.median(ratios))
+    for sample in found.samples:
+        assert 0 < sum(sample[stage] for stage in roofline.RASTER) <= sample["raster"]
+    for stage in (*roofline.RASTER, "raster", "primary"):
+        assert row[f"{stage}_ms"] == pytest.approx(
+            1e3 * np.median([s[stage] for s in found.samples])
+        )
+    ratios = [s["primary"] / s["raster"] for s in found.samples]
+    assert row["raster_speedup"] == pytest.approx(np.median(ratios))
 
 
 def test_a_view_of_nothing_is_refused(record):
@@ -311,6 +319,8 @@ def test_the_report_is_made_of_the_files_alone(tmp_path, record):
     assert cells_of(by_title["The march's work, a ray"], "hall, front")["rays"] == f"{row.rays:,}"
     busy = cells_of(by_title[f"Lanes at work, % of {WIDTH}"], "hall, front")
     assert busy["step"] == report.number(100 * row.busy_step)
+    drawn = cells_of(by_title["The raster's time"], "hall, front")
+    assert drawn["tiles"] == report.number(row.tiles_ms)
     assert len(by_title["Gathers"].rows) == 1 + len(roofline.STRUCTURES)
     fast = cells_of(by_title["How fast the machine reads"], "16")
     assert fast["gathers, G numbers/s, 1 thread"] == "0.125"

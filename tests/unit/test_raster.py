@@ -3,12 +3,14 @@
 import os
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
 
 import hybrid_rt as hrt
 from hybrid_rt import raster as raster_module
+from hybrid_rt_scenes import get_scene
 from naive import raster as naive
 from unit.test_simd import MACHINES, machine
 
@@ -342,3 +344,16 @@ def test_bad_arguments_are_named(change, argument):
     with pytest.raises(hrt.ArgumentError) as error:
         hrt.rasterize(**(good | change))
     assert error.value.argument == argument
+
+
+def test_the_stages_are_timed():
+    spec = get_scene("cornell")
+    camera = spec.camera(next(iter(spec.cameras)), 32, 24)
+    scene = spec.load()
+    hrt.rasterize(scene, camera, threads=1)
+    before = time.perf_counter()
+    timings = hrt.rasterize(scene, camera, threads=1).timings
+    took = time.perf_counter() - before
+    assert list(timings) == ["vertices", "cull", "records", "tiles"]
+    assert min(timings.values()) > 0
+    assert sum(timings.values()) <= took

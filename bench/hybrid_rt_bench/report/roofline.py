@@ -8,7 +8,14 @@ import pandas as pd
 
 from hybrid_rt_bench.report.table import Table, interval, number, threads_text
 from hybrid_rt_bench.results import RunData
-from hybrid_rt_bench.roofline import STRUCTURES, far_gathers_ns, far_ns, near_gathers_ns, ns_element
+from hybrid_rt_bench.roofline import (
+    RASTER,
+    STRUCTURES,
+    far_gathers_ns,
+    far_ns,
+    near_gathers_ns,
+    ns_element,
+)
 
 STAGES = ("step", "look", "entry", "plane", "test")
 NEVER = "none"
@@ -17,7 +24,10 @@ NEVER = "none"
 
 def tables(run: RunData) -> list[Table]:
     """Return every table of the run, in the order of reading."""
-    return [budgets(run), parts(run), work(run), busy(run), gathers(run), machine(run)]
+    found = [budgets(run), parts(run), work(run), busy(run), gathers(run), machine(run)]
+    if "raster_ms" in run.results:  # runs of before have none
+        found.append(raster(run))
+    return found
 
 
 def budgets(run: RunData) -> Table:
@@ -135,6 +145,33 @@ def busy(run: RunData) -> Table:
     table.notes.append(
         "Entry: a place of the lists of as many pixels as there are lanes; plane: where that names "
         "a triangle that was not tested just before. Vectors: of all five stages."
+    )
+    return table
+
+
+def raster(run: RunData) -> Table:
+    """Return what the raster of the views takes, stage by stage, beside Embree's primary rays."""
+    table = Table(
+        "The raster's time",
+        ["", "Embree, primary rays", "raster", "primary / raster", *RASTER],
+    )
+    for heading, rows in _groups(run):
+        table.rows.append([heading])
+        for row in _rows(rows):
+            table.rows.append(
+                [
+                    view(run, row),
+                    number(row.primary_ms),
+                    number(row.raster_ms),
+                    interval(row.raster_speedup, row.raster_speedup_low, row.raster_speedup_high),
+                    *(number(row[f"{stage}_ms"]) for stage in RASTER),
+                ]
+            )
+    table.notes.append(
+        "Milliseconds a view: depth, derivatives and primitive of every pixel. Vertices: "
+        "projecting them; cull: which faces may cover a pixel; records: their planes, and the "
+        "tiles they are put into; tiles: drawing these and writing the images. Embree: the "
+        "strongest of its paths for the primary rays."
     )
     return table
 
