@@ -1,6 +1,6 @@
 """Screen-space ray marching in front of an exact tracer: raster, march, trace, judge."""
 
-from hybrid_rt.camera import project, unproject
+from hybrid_rt.camera.pinhole import Camera, project, unproject
 from hybrid_rt.errors import (
     ArgumentError,
     EmbreeError,
@@ -8,20 +8,30 @@ from hybrid_rt.errors import (
     MeshFileError,
     UnknownNameError,
 )
-from hybrid_rt.hybrid import occluded_hybrid, trace_hybrid
-from hybrid_rt.io import read_mesh
-from hybrid_rt.lights import AreaLight, DirectionalLight, Light, PointLight
-from hybrid_rt.march import march
-from hybrid_rt.metrics import (
-    Judged,
-    Verdict,
-    alpha,
-    by_status,
-    judge,
-    judge_occlusion,
-    rates,
+from hybrid_rt.hybrid import HybridResult, OcclusionResult, occluded_hybrid, trace_hybrid
+from hybrid_rt.judge.metrics import Judged, Verdict, alpha, by_status, judge, judge_occlusion, rates
+from hybrid_rt.judge.rate import Rate
+from hybrid_rt.judge.truth import Nearest, Truth
+from hybrid_rt.raster.gbuffer import GBuffer
+from hybrid_rt.raster.lists import PrimitiveLists
+from hybrid_rt.raster.pyramid import DepthPyramid, build_depth_pyramid
+from hybrid_rt.raster.rasterize import rasterize
+from hybrid_rt.raster.slope_pyramid import SlopePyramid, build_slope_pyramid
+from hybrid_rt.rays.hits import Hits
+from hybrid_rt.rays.rays import Rays
+from hybrid_rt.scene.io import load_scene, read_mesh
+from hybrid_rt.scene.lights import AreaLight, DirectionalLight, Light, PointLight
+from hybrid_rt.scene.mesh import Mesh, Scene
+from hybrid_rt.secondary import (
+    ambient_occlusion_rays,
+    diffuse_rays,
+    glossy_rays,
+    mirror_rays,
+    shadow_rays,
 )
-from hybrid_rt.modes import (
+from hybrid_rt.techniques.march import march
+from hybrid_rt.techniques.marched import Marched, MarchStatus, MarchWork
+from hybrid_rt.techniques.modes import (
     DEFAULT_THICKNESS,
     Certified,
     HiZ,
@@ -31,36 +41,7 @@ from hybrid_rt.modes import (
     PixelDDA,
     SlopeAware,
 )
-from hybrid_rt.pyramid import build_depth_pyramid
-from hybrid_rt.raster import rasterize
-from hybrid_rt.rate import Rate
-from hybrid_rt.rays import (
-    ambient_occlusion_rays,
-    diffuse_rays,
-    glossy_rays,
-    mirror_rays,
-    shadow_rays,
-)
-from hybrid_rt.scene import load_scene
-from hybrid_rt.slope_pyramid import build_slope_pyramid
-from hybrid_rt.trace import BruteForceTracer, EmbreeTracer, embree_info, packet_available
-from hybrid_rt.truth import Nearest, Truth
-from hybrid_rt.types import (
-    Camera,
-    DepthPyramid,
-    GBuffer,
-    Hits,
-    HybridResult,
-    Marched,
-    MarchStatus,
-    MarchWork,
-    Mesh,
-    OcclusionResult,
-    PrimitiveLists,
-    Rays,
-    Scene,
-    SlopePyramid,
-)
+from hybrid_rt.trace.embree import BruteForceTracer, EmbreeTracer, embree_info, packet_available
 
 __version__ = "0.1.0"
 

@@ -4,27 +4,82 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from hybrid_rt import _threads, modes
+from hybrid_rt import _threads
+from hybrid_rt._arrays import F32, I32, U8, Bool
 from hybrid_rt.kernels import hybrid as kernels
-from hybrid_rt.march import march
-from hybrid_rt.modes import Certified, Mode
-from hybrid_rt.types import (
-    F32,
-    I32,
-    Bool,
-    GBuffer,
-    Hits,
-    HybridResult,
-    Marched,
-    OcclusionResult,
-    Pyramid,
-    Rays,
-)
+from hybrid_rt.raster.gbuffer import GBuffer
+from hybrid_rt.raster.slope_pyramid import Pyramid
+from hybrid_rt.rays.hits import Hits
+from hybrid_rt.rays.rays import Rays
+from hybrid_rt.techniques import modes
+from hybrid_rt.techniques.march import march
+from hybrid_rt.techniques.marched import Marched
+from hybrid_rt.techniques.modes import Certified, Mode
+
+
+class _OfMarch:
+    """What the results of a hybrid say of its march."""
+
+    marched: Marched
+
+    @property
+    def resolved(self) -> Bool:
+        """(N,) bool: whether the march answered the ray."""
+        return self.marched.resolved
+
+    @property
+    def status(self) -> U8:
+        """(N,) uint8: `MarchStatus` of every ray."""
+        return self.marched.status
+
+    @property
+    def pixel(self) -> I32:
+        """(N, 2) int32: the pixel that answered the ray, (-1, -1) where none did."""
+        return self.marched.pixel
+
+
+@dataclass(frozen=True, eq=False)
+class HybridResult(_OfMarch):
+    """What `trace_hybrid` returns.
+
+    Attributes
+    ----------
+    hits : Hits
+        For every ray, from the march or from the tracer.
+    marched : Marched
+        What the march said of every ray.
+    timings : dict of str to float
+        Seconds of the stages "march", "compaction", "fallback", "merge".
+    """
+
+    hits: Hits
+    marched: Marched
+    timings: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class OcclusionResult(_OfMarch):
+    """What `occluded_hybrid` returns.
+
+    Attributes
+    ----------
+    occluded : (N,) bool
+        For every ray, from the march or from the tracer.
+    marched : Marched
+        What the march said of every ray.
+    timings : dict of str to float
+        Seconds of the stages "march", "compaction", "fallback", "merge".
+    """
+
+    occluded: Bool
+    marched: Marched
+    timings: dict[str, float] = field(default_factory=dict)
+
 
 Answers = TypeVar("Answers", Hits, Bool)
 

@@ -15,10 +15,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-LISTS, WALK = "hybrid_rt/kernels/lists.py", "hybrid_rt/kernels/certified.py"
+LISTS, WALK = (
+    "hybrid_rt/kernels/raster/lists.py",
+    "hybrid_rt/kernels/techniques/certified/scalar.py",
+)
 TEST_LISTS, TEST_WALK = "tests/unit/test_lists.py", "tests/unit/test_certified.py"
 ROUNDING, HYBRID = "tests/numerics/test_certified_rounding.py", "tests/unit/test_hybrid.py"
-BINS = "hybrid_rt/kernels/lists_bins.py"
+BINS = "hybrid_rt/kernels/raster/lists_bins.py"
 LANES, PLANES = "tests/unit/test_certified_simd.py", "tests/numerics/test_planes.py"
 
 
@@ -35,7 +38,8 @@ class Mutant:
 
 MUTANTS = (
     Mutant("lists at pixel centres", LISTS, "half = 0.5 + margin", "half = 0.0", TEST_LISTS),
-    Mutant("no margin", "hybrid_rt/lists.py", "MARGIN_ULPS = 16", "MARGIN_ULPS = 0", ROUNDING),
+    Mutant("no margin", "hybrid_rt/raster/lists.py",
+           "MARGIN_ULPS = 16", "MARGIN_ULPS = 0", ROUNDING),
     Mutant(
         "triangles across the near plane left out", BINS,
         "return True, 0, 0, width - 1, height - 1", "return False, 0, 0, 0, 0", TEST_LISTS,
@@ -60,7 +64,7 @@ MUTANTS = (
     Mutant("coarse cells taken for free", WALK, "if near > F0 and not lowest > near:",
            "if near > F0 and level < 2 and not lowest > near:", TEST_WALK),
     Mutant("depth of the walk not lowered", WALK, "DEPTH_ULPS = 8.0", "DEPTH_ULPS = 0.0", ROUNDING),
-    Mutant("ends beyond the near plane", "hybrid_rt/kernels/screen.py",
+    Mutant("ends beyond the near plane", "hybrid_rt/kernels/techniques/screen.py",
            "s_end = (near - z) / (gz * near)", "s_end = 3.0 * (near - z) / (gz * near)", TEST_WALK),
     Mutant("edges without slack", WALK,
            "slack = 16.0 * E * r * size + 64.0 * (E * r) * (E * r)", "slack = 0.0", TEST_WALK),
@@ -84,7 +88,7 @@ MUTANTS = (
            "front = above > error", PLANES),
     Mutant("planes without the margin", LISTS,
            "(steep_x + steep_y) * margin + reach", "reach", PLANES),
-    Mutant("skipped rays taken for free", "hybrid_rt/kernels/certified_simd.py",
+    Mutant("skipped rays taken for free", "hybrid_rt/kernels/techniques/certified/lanes.py",
            "unmarched(i, SKIPPED, F32(0.0), out)", "unmarched(i, MISS, F32(0.0), out)",
            LANES),
     Mutant("handed over behind what is free", "hybrid_rt/kernels/hybrid.py",

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 import hybrid_rt as hrt
-from hybrid_rt.certified import LENGTH
-from hybrid_rt.lists import primitive_lists
+from hybrid_rt.raster.lists import primitive_lists
+from hybrid_rt.techniques.certified import LENGTH
 from hybrid_rt_bench.error_spec import Which
 from hybrid_rt_bench.techniques import Technique
 

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import hybrid_rt as hrt
-from hybrid_rt.kernels import certified_simd as lanes
+from hybrid_rt.kernels.techniques.certified import lanes
 from hybrid_rt_bench import roofline, stats, strongest
 from hybrid_rt_bench.measure import CellError, LoadedScene
 from hybrid_rt_bench.primary import primary_rays

@@ -24,7 +24,7 @@ class Technique:
     reference : str
         Who published it.
     mode : Mode
-        With the published default parameters, for `hybrid_rt.march` and `hybrid_rt.trace_hybrid`.
+        With the published default parameters.
     grid : callable
         Takes the diagonal of a scene's bounding box, world units; see `points`.
     """

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt.kernels import certified as kernels
+from hybrid_rt.kernels.techniques.certified import scalar as kernels
 
 S = hrt.MarchStatus
 
@@ -15,7 +15,7 @@ S = hrt.MarchStatus
 def kernel(request, monkeypatch):
     """Run every test with either kernel."""
     if request.param == "one by one":
-        monkeypatch.setattr("hybrid_rt.certified._countable", lambda *_: False)
+        monkeypatch.setattr("hybrid_rt.techniques.certified._countable", lambda *_: False)
 
 
 F = np.float32

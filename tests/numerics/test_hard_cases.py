@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt.modes import MODES
+from hybrid_rt.techniques.modes import MODES
 from hybrid_rt_scenes.hard_cases import get_hard_case, grade, hard_case_names, truth
 from naive import triangle as naive
 

@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt.kernels import certified_simd as lanes
 from hybrid_rt.kernels.simd import WIDTH
+from hybrid_rt.kernels.techniques.certified import lanes
 from hybrid_rt_bench import cli, rates, results, roofline, roofline_cell, roofline_run
 from hybrid_rt_bench import rates_kernels as kernels
 from hybrid_rt_bench.measure import prepare

@@ -14,7 +14,7 @@ S = hrt.MarchStatus
 def kernel(request, monkeypatch):
     """Run every test with either kernel."""
     if request.param == "one by one":
-        monkeypatch.setattr("hybrid_rt.certified._countable", lambda *_: False)
+        monkeypatch.setattr("hybrid_rt.techniques.certified._countable", lambda *_: False)
 
 
 def prepare(scene, camera, lists=4, lists_camera=None):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt.kernels import certified_simd as lanes_of
+from hybrid_rt.kernels.techniques.certified import lanes as lanes_of
 from hybrid_rt_scenes.hard_cases import get_hard_case, hard_case_names
 from unit.test_certified import other_views, prepare, random_rays
 from unit.test_lists import random_scene
@@ -242,7 +242,7 @@ def test_arrays_that_cannot_be_written_or_have_gaps():
 def test_arrays_too_long_for_the_lanes_are_marched_ray_by_ray(monkeypatch):
     case = random_case(0)
     expected = hrt.march(*case, hrt.Certified())
-    monkeypatch.setattr("hybrid_rt.certified.LARGEST_INDEX", 100)
+    monkeypatch.setattr("hybrid_rt.techniques.certified.LARGEST_INDEX", 100)
     marched = hrt.march(*case, hrt.Certified())
     assert_same(marched, expected)
     assert marched.steps_by_level is not None

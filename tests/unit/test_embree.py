@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt import embree
+from hybrid_rt.trace import native as embree
 
 needs_packets = pytest.mark.skipif(
     hrt.packet_available() is not None, reason=str(hrt.packet_available())

@@ -131,7 +131,7 @@ def test_a_plane_through_the_eye_is_bounded_by_its_box():
 
 def test_threads_and_batches_change_nothing(monkeypatch):
     from hybrid_rt import _threads
-    from hybrid_rt import lists as module
+    from hybrid_rt.raster import lists as module
 
     rng = np.random.default_rng(8)
     scene = random_scene(rng, 300)
@@ -181,7 +181,7 @@ def test_the_order_of_the_faces_changes_nothing():
 
 
 def test_of_equal_bounds_the_smaller_number_comes_first(monkeypatch):
-    from hybrid_rt import lists as module
+    from hybrid_rt.raster import lists as module
 
     scene, camera = crowded(n=60)
     thrice = hrt.Scene.from_arrays(scene.vertices, np.tile(scene.faces, (3, 1)))

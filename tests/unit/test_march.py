@@ -5,7 +5,7 @@ import pytest
 
 import hybrid_rt as hrt
 import synthetic
-from hybrid_rt.kernels import screen as kernels
+from hybrid_rt.kernels.techniques import screen as kernels
 from naive import march as naive
 
 S = hrt.MarchStatus

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt import raster as raster_module
+from hybrid_rt.raster import rasterize as raster_module
 from hybrid_rt_scenes import get_scene
 from naive import raster as naive
 from unit.test_simd import MACHINES, machine

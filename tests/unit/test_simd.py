@@ -18,7 +18,7 @@ from numba import njit
 from numba.core.errors import TypingError
 
 from hybrid_rt.kernels import simd
-from hybrid_rt.kernels.simd import (
+from hybrid_rt.kernels.simd import (  # fmt: skip
     WIDTH,
     absolute,
     all_,
@@ -62,7 +62,7 @@ from hybrid_rt.kernels.simd import (
     to_f64,
     to_i32,
     to_i64,
-)  # fmt: skip
+)
 
 # Not cached: a cached kernel would not notice a change in the package under test.
 compiled = njit(error_model="numpy")

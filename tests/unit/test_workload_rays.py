@@ -9,7 +9,7 @@ from scipy import stats
 
 import hybrid_rt as hrt
 from hybrid_rt.kernels._jit import kernel
-from hybrid_rt.kernels.philox import philox
+from hybrid_rt.kernels.secondary.philox import philox
 from naive import rays as naive
 
 # All low: what they light lies partly in shadow.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import hybrid_rt as hrt
-from hybrid_rt.certified import LENGTH
+from hybrid_rt.techniques.certified import LENGTH
 from hybrid_rt_bench import strongest
 from hybrid_rt_bench.peers.base import Answers, Drawing, Opened, Picture, Query, View
 

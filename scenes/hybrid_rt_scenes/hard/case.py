@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 import hybrid_rt as hrt
-from hybrid_rt.types import F32
+from hybrid_rt._arrays import F32
 from hybrid_rt_scenes.hard.truth import Truth, truth
 
 DepthFormat = Literal["float32", "unorm16", "unorm24", "standard_z"]

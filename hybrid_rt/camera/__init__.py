@@ -1,0 +1,1 @@
+"""Cameras: how world points become pixels, and back."""

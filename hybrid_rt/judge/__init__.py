@@ -1,0 +1,1 @@
+"""What is right and what is wrong; imports nothing of what it judges."""

@@ -1,0 +1,1 @@
+"""Kernels that draw a view and reduce it."""

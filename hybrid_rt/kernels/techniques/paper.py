@@ -1,0 +1,227 @@
+"""The march of "Ray Tracing Algorithm Based on Screen Space Ray Marching", one ray at a time."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+from hybrid_rt.kernels._queue import fetch_add
+from hybrid_rt.kernels.techniques.screen import (
+    CHUNK,
+    EXHAUSTED,
+    F0,
+    HALF,
+    HIDDEN,
+    HIT,
+    OFFSCREEN,
+    axis,
+    clamp,
+    edge_s,
+    next_cell,
+    screen_ray,
+    write_row,
+)
+
+
+@kernel
+def tilted_plane_s(
+    i, j, depth, ddx, ddy, x0, y0, z0, dx, dy, dz, inv_x, inv_y, step_x, step_y, s_start, s_end
+):
+    """Return the s at which the ray meets the plane of pixel (i, j) inside that pixel, or -1.
+
+    The pixel is the plane ``depth + ddx (x - i - 1/2) + ddy (y - j - 1/2)``; the ray must reach it
+    from the observer's side. Paper: "Correct".
+    """
+    centre = depth[j, i]
+    if centre <= F0:
+        return np.float32(-1.0)
+    first, last = s_start, s_end
+    if step_x != 0:
+        first = max(first, (np.float32(i + (step_x < 0)) - x0) * inv_x)
+        last = min(last, (np.float32(i + (step_x > 0)) - x0) * inv_x)
+    if step_y != 0:
+        first = max(first, (np.float32(j + (step_y < 0)) - y0) * inv_y)
+        last = min(last, (np.float32(j + (step_y > 0)) - y0) * inv_y)
+    a, b = ddx[j, i], ddy[j, i]
+    # Height of the ray in front of the plane, linear in s: h(s) = h0 + s * hs.
+    h0 = z0 - (centre + a * (x0 - np.float32(i) - HALF) + b * (y0 - np.float32(j) - HALF))
+    hs = dz - (a * dx + b * dy)
+    in_front = h0 + first * hs
+    behind = h0 + last * hs
+    if in_front < F0 or behind > F0 or last < first:
+        return np.float32(-1.0)
+    if in_front == behind:
+        return first
+    return first + (last - first) * (in_front / (in_front - behind))
+
+
+@inlined
+def march_ray(
+    status,
+    x,
+    y,
+    z0,
+    dx,
+    dy,
+    dz,
+    s_end,
+    own_x,
+    own_y,
+    depth,
+    ddx,
+    ddy,
+    cells,
+    offsets,
+    pitches,
+    samples,
+    max_steps,
+    steps_by_level,
+):
+    """March one ray; return (status, pixel x, pixel y, s of the hit, s proven free, steps)."""
+    height, width = depth.shape
+    top = offsets.shape[0] - 1
+    inv_x, bias_x, step_x, far_x = axis(dx)
+    inv_y, bias_y, step_y, far_y = axis(dy)
+    cx = clamp(int(x), 0, width - 1)
+    cy = clamp(int(y), 0, height - 1)
+    s = F0
+    level = 0
+    steps = 0
+    from_x = False  # the ray entered the current pixel through a vertical edge
+    # A ray on the visible surface of its own pixel leaves that pixel unread: the surface would
+    # only be compared with itself.
+    skip = cx == own_x and cy == own_y
+    while True:
+        blocked = False
+        for _ in range(samples):
+            lx, ly = cx >> level, cy >> level
+            edge_x, edge_y = (lx + far_x) << level, (ly + far_y) << level
+            sx = edge_s(edge_x, x, inv_x, bias_x)
+            sy = edge_s(edge_y, y, inv_y, bias_y)
+            s_exit = min(min(sx, sy), s_end)
+            if skip:
+                skip = False
+            else:
+                if steps == max_steps:
+                    return EXHAUSTED, -1, -1, F0, s, steps
+                steps += 1
+                steps_by_level[level] += 1
+                nearest = cells[offsets[level] + ly * pitches[level] + lx]
+                farthest_ray = z0 + dz * (s_exit if dz < F0 else s)
+                if nearest > F0 and not farthest_ray > nearest:
+                    blocked = True
+                    break
+            if s_exit > s:
+                s = s_exit
+            if s_exit >= s_end:
+                return status, -1, -1, F0, s_end, steps
+            from_x = sx < sy
+            cx, cy = next_cell(
+                cx, cy, lx, ly, level, edge_x, edge_y, sx, sy, s, x, y, dx, dy, step_x, step_y
+            )
+            if cx < 0 or cy < 0 or cx >= width or cy >= height:
+                return OFFSCREEN, -1, -1, F0, s, steps
+        if not blocked:
+            if level < top:
+                level += 1
+        elif level > 0:
+            level -= 1
+        else:
+            break
+    hit_x, hit_y = cx, cy
+    hit = tilted_plane_s(
+        hit_x,
+        hit_y,
+        depth,
+        ddx,
+        ddy,
+        x,
+        y,
+        z0,
+        dx,
+        dy,
+        dz,
+        inv_x,
+        inv_y,
+        step_x,
+        step_y,
+        F0,
+        s_end,
+    )
+    if hit < F0 and s > F0:
+        if from_x:
+            hit_x -= step_x
+        else:
+            hit_y -= step_y
+        if not (hit_x == own_x and hit_y == own_y):
+            hit = tilted_plane_s(
+                hit_x,
+                hit_y,
+                depth,
+                ddx,
+                ddy,
+                x,
+                y,
+                z0,
+                dx,
+                dy,
+                dz,
+                inv_x,
+                inv_y,
+                step_x,
+                step_y,
+                F0,
+                s_end,
+            )
+    if hit < F0:
+        return HIDDEN, -1, -1, F0, s, steps
+    return HIT, hit_x, hit_y, hit, min(s, hit), steps
+
+
+@kernel
+def march_chunk(
+    first, last, origin, direction, ray_pixel, t_near, t_far, depth, ddx, ddy, prim_id,
+    cells, offsets, pitches, m, eye, near, samples, max_steps,
+    status, resolved, pixel, prim, t, t_free, steps, steps_by_level,
+):  # fmt: skip
+    """Set up rays in float64, march them in float32 and write their rows of the outputs."""
+    height, width = depth.shape
+    for i in range(first, last):
+        end, x, y, z0, dx, dy, dz, s_end, z, gz = screen_ray(
+            np.float64(origin[i, 0]), np.float64(origin[i, 1]), np.float64(origin[i, 2]),
+            np.float64(direction[i, 0]), np.float64(direction[i, 1]), np.float64(direction[i, 2]),
+            np.float64(t_near[i]), np.float64(t_far[i]), m, eye, near, width, height,
+        )  # fmt: skip
+        how, hit_x, hit_y, s_hit, s_free, count = end, -1, -1, F0, F0, 0
+        if s_end >= 0.0:
+            how, hit_x, hit_y, s_hit, s_free, count = march_ray(
+                end, np.float32(x), np.float32(y), np.float32(z0),
+                np.float32(dx), np.float32(dy), np.float32(dz), np.float32(s_end),
+                ray_pixel[i, 0], ray_pixel[i, 1], depth, ddx, ddy,
+                cells, offsets, pitches, samples, max_steps, steps_by_level,
+            )  # fmt: skip
+        write_row(
+            i, how, how == HIT, hit_x, hit_y, s_hit, s_free, count, s_end >= 0.0, z, gz,
+            t_near, t_far, prim_id, status, resolved, pixel, prim, t, t_free, steps,
+        )  # fmt: skip
+
+
+@parallel_kernel
+def march(
+    workers, origin, direction, ray_pixel, t_near, t_far, depth, ddx, ddy, prim_id,
+    cells, offsets, pitches, m, eye, near, samples, max_steps,
+    status, resolved, pixel, prim, t, t_free, steps, steps_by_level,
+):  # fmt: skip
+    """March rays (N, 3) through a pyramid; outputs (N,), steps_by_level (workers, L) int64."""
+    n = origin.shape[0]
+    taken = np.zeros(1, np.int64)
+    for worker in prange(workers):
+        first = fetch_add(taken.ctypes.data, CHUNK)
+        while first < n:
+            march_chunk(
+                first, min(n, first + CHUNK), origin, direction, ray_pixel, t_near, t_far,
+                depth, ddx, ddy, prim_id, cells, offsets, pitches, m, eye, near, samples, max_steps,
+                status, resolved, pixel, prim, t, t_free, steps, steps_by_level[worker],
+            )  # fmt: skip
+            first = fetch_add(taken.ctypes.data, CHUNK)

@@ -1,0 +1,1 @@
+"""What one view shows: G-buffer, pyramids, lists."""

@@ -1,0 +1,163 @@
+"""What a march says about each ray."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from hybrid_rt._arrays import F32, I32, I64, U8, Bool
+
+
+class MarchStatus(enum.IntEnum):
+    """How the march of one ray ended."""
+
+    HIT = 0
+    """A pixel answers the ray."""
+    MISS = 1
+    """The ray stays in front of everything, for ever (or up to its t_far)."""
+    OFFSCREEN = 2
+    """It leaves the image sideways."""
+    HIDDEN = 3
+    """It meets or goes behind a visible surface, and what the screen holds does not answer it."""
+    NEAR = 4
+    """It leaves through the near plane, towards the observer."""
+    EXHAUSTED = 5
+    """The step budget ran out."""
+    INVALID = 6
+    """NaN, an infinity or a zero direction."""
+    UNDECIDED = 7
+    """Certified only: two hits, or a hit and a miss, are closer than float64 can tell apart."""
+    SKIPPED = 8
+    """Certified only: not marched, since no probe near it in the order of the rays was resolved."""
+
+
+@dataclass(frozen=True)
+class MarchWork:
+    """What the lanes of a march went through, over all rays and workers.
+
+    A stage goes through vectors of `lanes` lanes, of which some are at work. All but the numbers of
+    vectors are the same however rays are put into lanes.
+
+    Attributes
+    ----------
+    lanes : int
+        Of a vector.
+    step_vectors, steps, passes : int
+        Steps read the pyramid, passes leave a pixel that has been looked at.
+    refills : int
+        Lanes that were given a ray to walk.
+    look_vectors, looks : int
+        Pixels whose lists were looked at, once for each time that a ray was sent there.
+    entry_vectors, entries : int
+        Entries of lists that were read.
+    rests : int
+        Lists that were gone through to their end.
+    plane_vectors, planes : int
+        Planes of triangles that were read.
+    test_vectors, tests : int
+        Exact tests.
+    """
+
+    lanes: int
+    step_vectors: int
+    steps: int
+    passes: int
+    refills: int
+    look_vectors: int
+    looks: int
+    entry_vectors: int
+    entries: int
+    rests: int
+    plane_vectors: int
+    planes: int
+    test_vectors: int
+    tests: int
+
+    @property
+    def busy(self) -> dict[str, float]:
+        """Share of the lanes at work, for each stage; NaN for one that nothing came to."""
+        stages = {
+            "step": (self.steps + self.passes, self.step_vectors),
+            "look": (self.looks, self.look_vectors),
+            "entry": (self.entries, self.entry_vectors),
+            "plane": (self.planes, self.plane_vectors),
+            "test": (self.tests, self.test_vectors),
+        }
+        return {
+            stage: at_work / (vectors * self.lanes) if vectors else math.nan
+            for stage, (at_work, vectors) in stages.items()
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Marched:
+    """What the screen says about each ray.
+
+    Attributes
+    ----------
+    status : (N,) uint8
+        A `MarchStatus` for each ray.
+    resolved : (N,) bool
+        Whether the march answers the ray, with a hit or, where `prim_id` is -1, with a miss. What
+        resolves a ray is up to the mode.
+    pixel : (N, 2) int32
+        The pixel (x, y) that answers the ray with a hit, else (-1, -1). An answer from lists of
+        another view than the G-buffer's has none.
+    prim_id : (N,) int32
+        The primitive that is hit, -1 for a miss and for unresolved.
+    t : (N,) float32
+        Where it is hit, infinity for a miss and for unresolved.
+    t_free : (N,) float32
+        Up to here the march found the ray in front of everything that it read.
+    steps : (N,) int32
+        Samples of the pyramid that the ray took.
+    steps_by_level : (L,) int64, optional
+        The same, summed over the rays, for each level; None where it was not counted.
+    tests : int
+        Exact tests of a ray against a primitive, over all rays; only mode "certified" makes any.
+    work : MarchWork, optional
+        What the lanes went through; None where the march has none.
+    """
+
+    status: U8
+    resolved: Bool
+    pixel: I32
+    prim_id: I32
+    t: F32
+    t_free: F32
+    steps: I32
+    steps_by_level: I64 | None = None
+    tests: int = 0
+    work: MarchWork | None = None
+
+    @classmethod
+    def unfilled(cls, n: int) -> Marched:
+        """Return room for `n` rays, with nothing in it yet, for code that writes every row."""
+        return cls(
+            np.empty(n, np.uint8),
+            np.empty(n, np.bool_),
+            np.empty((n, 2), np.int32),
+            np.empty(n, np.int32),
+            np.empty(n, np.float32),
+            np.empty(n, np.float32),
+            np.empty(n, np.int32),
+        )
+
+    @property
+    def rows(self) -> tuple[U8, Bool, I32, I32, F32, F32, I32]:
+        """The arrays with a row for each ray, in the order of the attributes, for kernels."""
+        return (
+            self.status,
+            self.resolved,
+            self.pixel,
+            self.prim_id,
+            self.t,
+            self.t_free,
+            self.steps,
+        )
+
+    def __len__(self) -> int:
+        return len(self.status)

@@ -1,0 +1,45 @@
+"""The paper's march: nearest depths of a pyramid, then the tilted plane of one or two pixels."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hybrid_rt import _threads
+from hybrid_rt.kernels.techniques import paper as kernels
+from hybrid_rt.raster.gbuffer import GBuffer
+from hybrid_rt.raster.pyramid import DepthPyramid
+from hybrid_rt.rays.rays import Rays
+from hybrid_rt.techniques.marched import Marched
+from hybrid_rt.techniques.modes import Paper
+
+
+def march(
+    rays: Rays, gbuffer: GBuffer, pyramid: DepthPyramid, mode: Paper, threads: int | None
+) -> Marched:
+    """Return what `Paper` says about each ray; arguments as `hybrid_rt.march` has checked them."""
+    height, width = gbuffer.depth.shape
+    max_steps = 2 * (width + height) + 2 if mode.max_steps is None else mode.max_steps
+    marched = Marched.unfilled(len(rays))
+    with _threads.limited(threads) as workers:
+        steps_by_level = np.zeros((workers, len(pyramid)), np.int64)
+        kernels.march(
+            workers,
+            *rays.arrays,
+            gbuffer.depth,
+            gbuffer.ddx,
+            gbuffer.ddy,
+            gbuffer.prim_id,
+            pyramid.data,
+            pyramid.offsets,
+            pyramid.pitches,
+            gbuffer.camera.pixel_from_world,
+            np.array(gbuffer.camera.eye),
+            gbuffer.camera.near,
+            mode.samples,
+            max_steps,
+            *marched.rows,
+            steps_by_level,
+        )
+    return replace(marched, steps_by_level=steps_by_level.sum(axis=0))

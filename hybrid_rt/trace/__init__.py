@@ -1,0 +1,1 @@
+"""Tracers: whatever answers any ray."""
