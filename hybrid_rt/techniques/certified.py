@@ -13,6 +13,7 @@ from hybrid_rt._arrays import F64
 from hybrid_rt.camera.pinhole import Camera
 from hybrid_rt.kernels.techniques.certified import lanes as simd_kernels
 from hybrid_rt.kernels.techniques.certified import scalar as kernels
+from hybrid_rt.kernels.techniques.certified import slots
 from hybrid_rt.raster.gbuffer import GBuffer
 from hybrid_rt.raster.lists import PrimitiveLists, primitive_lists
 from hybrid_rt.raster.pyramid import DepthPyramid, bits, build_depth_pyramid
@@ -81,7 +82,7 @@ def _in_lanes(
     columns, rows = bits(width, height)
     marched = Marched.unfilled(len(rays))
     with _threads.limited(threads) as workers:
-        counted = np.zeros((workers, simd_kernels.COUNTERS), np.int64)
+        counted = np.zeros((workers, slots.COUNTERS), np.int64)
         simd_kernels.march(
             workers,
             tuple(_flat(a) for a in (rays.origin, rays.direction, rays.t_near, rays.t_far)),
@@ -100,7 +101,7 @@ def _in_lanes(
             marched.rows,
             counted,
         )
-    work = MarchWork(simd_kernels.W, *map(int, counted.sum(axis=0)))
+    work = MarchWork(slots.W, *map(int, counted.sum(axis=0)))
     return replace(marched, tests=work.tests, work=work)
 
 
