@@ -22,6 +22,7 @@ LISTS, WALK = (
 TEST_LISTS, TEST_WALK = "tests/unit/test_lists.py", "tests/unit/test_certified.py"
 ROUNDING, HYBRID = "tests/numerics/test_certified_rounding.py", "tests/unit/test_hybrid.py"
 BINS = "hybrid_rt/kernels/raster/lists_bins.py"
+FACE_PLANES = "hybrid_rt/kernels/raster/lists_planes.py"
 LANES, PLANES = "tests/unit/test_certified_simd.py", "tests/numerics/test_planes.py"
 
 
@@ -37,7 +38,8 @@ class Mutant:
 
 
 MUTANTS = (
-    Mutant("lists at pixel centres", LISTS, "half = 0.5 + margin", "half = 0.0", TEST_LISTS),
+    Mutant("lists at pixel centres", FACE_PLANES,
+           "half = 0.5 + margin", "half = 0.0", TEST_LISTS),
     Mutant("no margin", "hybrid_rt/raster/lists.py",
            "MARGIN_ULPS = 16", "MARGIN_ULPS = 0", ROUNDING),
     Mutant(
@@ -86,7 +88,7 @@ MUTANTS = (
            PLANES),
     Mutant("plane looked at in one end only", WALK, "front = min(above, then) > error",
            "front = above > error", PLANES),
-    Mutant("planes without the margin", LISTS,
+    Mutant("planes without the margin", FACE_PLANES,
            "(steep_x + steep_y) * margin + reach", "reach", PLANES),
     Mutant("skipped rays taken for free", "hybrid_rt/kernels/techniques/certified/lanes.py",
            "unmarched(i, SKIPPED, F32(0.0), out)", "unmarched(i, MISS, F32(0.0), out)",

@@ -13,7 +13,7 @@ from hybrid_rt.base import Point, Screen, Technique, register
 from hybrid_rt.camera.pinhole import LARGEST_SIDE, Camera
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels.arrays import F64
-from hybrid_rt.kernels.techniques.certified import lanes, scalar
+from hybrid_rt.kernels.techniques.certified import lanes, scalar, slots
 from hybrid_rt.raster.gbuffer import GBuffer
 from hybrid_rt.raster.lists import PrimitiveLists, primitive_lists
 from hybrid_rt.raster.pyramid import DepthPyramid, bits, pyramid_of
@@ -233,7 +233,7 @@ def _in_lanes(
     marched = Marched.unfilled(len(rays))
     origin, direction, _, t_near, t_far = rays.arrays
     with _threads.limited(threads) as workers:
-        counted = np.zeros((workers, lanes.COUNTERS), np.int64)
+        counted = np.zeros((workers, slots.COUNTERS), np.int64)
         lanes.march(
             workers,
             (origin.reshape(-1), direction.reshape(-1), t_near, t_far),
@@ -252,7 +252,7 @@ def _in_lanes(
             tuple(marched.arrays),
             counted,
         )
-    work = MarchWork(lanes.W, *map(int, counted.sum(axis=0)))
+    work = MarchWork(slots.W, *map(int, counted.sum(axis=0)))
     return replace(marched, tests=work.tests, work=work)
 
 

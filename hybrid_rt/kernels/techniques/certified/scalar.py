@@ -39,7 +39,14 @@ from numba import prange
 
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
 from hybrid_rt.kernels._queue import fetch_add
-from hybrid_rt.kernels.raster.lists import DEPTH, ERROR, REFERENCE_X, REFERENCE_Y, SLOPE_X, SLOPE_Y
+from hybrid_rt.kernels.raster.lists_planes import (
+    DEPTH,
+    ERROR,
+    REFERENCE_X,
+    REFERENCE_Y,
+    SLOPE_X,
+    SLOPE_Y,
+)
 from hybrid_rt.kernels.techniques.screen import (
     CHUNK,
     EXHAUSTED,
