@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from hybrid_rt.judge.rate import Rate
+from hybrid_rt.judging.rate import Rate
 from hybrid_rt_bench import stats
 
 __all__ = ["CELL", "POINT", "VERDICTS", "WRONG", "Pooled", "Rate", "pareto", "pools"]

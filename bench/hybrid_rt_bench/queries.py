@@ -82,7 +82,7 @@ class NearestHit:
         truth: hrt.Truth,
         pixel: Any = None,
     ) -> hrt.Judged:
-        """Return the verdicts of `hybrid_rt.judge`, as if all rays were resolved.
+        """Return the verdicts of `hybrid_rt.judging`, as if all rays were resolved.
 
         Answers that agree with the reference are correct; of these only every `SAMPLED`-th has its
         errors computed, which is most of a judge's work.
@@ -103,7 +103,7 @@ class NearestHit:
         camera: hrt.Camera,
         truth: hrt.Truth,
     ) -> NDArray[np.uint8]:
-        """Return the verdicts of `hybrid_rt.judge` on those rays, UNRESOLVED for the others."""
+        """Return the verdicts of `hybrid_rt.judging` on those rays, UNRESOLVED for the others."""
         return hrt.judge(
             rays, reference, wrong, reference, truth.scene, camera, truth=truth, every=True
         ).verdict

@@ -1,4 +1,4 @@
-"""Project world points to the screen and back."""
+"""A pinhole camera; world points to the screen and back."""
 
 from __future__ import annotations
 
@@ -9,8 +9,15 @@ from typing import Any
 import numpy as np
 
 from hybrid_rt import _check
-from hybrid_rt._arrays import F64
 from hybrid_rt.errors import ArgumentError
+from hybrid_rt.kernels.arrays import F64, ViewArrays
+
+Vector = tuple[float, float, float]
+AXES = ("right", "up", "forward")
+LARGEST_SIDE = 32768
+"""Pixels along a side: what the raster's fixed-point coordinates hold."""
+ORTHONORMAL = 1e-9
+"""By how much products of the axes, which have length 1, may be off."""
 
 
 @dataclass(frozen=True)
@@ -30,14 +37,35 @@ class Camera:
         Distance of the near plane along `forward`, world units.
     """
 
-    eye: tuple[float, float, float]
-    right: tuple[float, float, float]
-    up: tuple[float, float, float]
-    forward: tuple[float, float, float]
+    eye: Vector
+    right: Vector
+    up: Vector
+    forward: Vector
     vfov_deg: float
     width: int
     height: int
     near: float
+
+    def __post_init__(self) -> None:
+        checked = {
+            **{name: _check.vector3(name, getattr(self, name)) for name in ("eye", *AXES)},
+            "vfov_deg": _check.real("vfov_deg", self.vfov_deg, above=0.0, below=180.0),
+            "width": _check.integer("width", self.width, least=1, most=LARGEST_SIDE),
+            "height": _check.integer("height", self.height, least=1, most=LARGEST_SIDE),
+            "near": _check.float32_length("near", self.near),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+        if max(map(abs, self.eye)) > np.finfo(np.float32).max:
+            expected = "coordinates within float32, as vertices have them"
+            raise ArgumentError("eye", expected, _check.describe(self.eye))
+        axes = np.array([self.right, self.up, self.forward])
+        for k, name in enumerate(AXES):
+            if np.abs(axes @ axes[k] - np.eye(3)[k]).max() > ORTHONORMAL:
+                expected = "an axis of length 1 at right angles to the other two"
+                raise ArgumentError(name, expected, _check.describe(getattr(self, name)))
+        if not np.isfinite(self.focal_px) or not np.isfinite(self.focal_px * LARGEST_SIDE):
+            raise ArgumentError("vfov_deg", "an angle that float64 resolves", str(self.vfov_deg))
 
     @classmethod
     def look_at(
@@ -90,19 +118,15 @@ class Camera:
             right=_vec(right),
             up=_vec(np.cross(right, forward)),
             forward=_vec(forward),
-            vfov_deg=_check.real("vfov_deg", vfov_deg, above=0.0, below=180.0),
-            width=_check.integer("width", width, least=1, most=32768),
-            height=_check.integer("height", height, least=1, most=32768),
-            near=_check.real("near", near, above=0.0),
+            vfov_deg=vfov_deg,
+            width=width,
+            height=height,
+            near=near,
         )
 
     def resized(self, width: int, height: int) -> Camera:
         """Return the same view with another number of pixels; the vertical field of view stays."""
-        return replace(
-            self,
-            width=_check.integer("width", width, least=1, most=32768),
-            height=_check.integer("height", height, least=1, most=32768),
-        )
+        return replace(self, width=width, height=height)
 
     def widened(self, factor: float) -> Camera:
         """Return a view `factor` times as wide and as high around the same axis.
@@ -124,6 +148,11 @@ class Camera:
         height = max(1, round(self.height * factor))
         wider = self.resized(max(1, round(self.width * factor)), height)
         return replace(wider, vfov_deg=math.degrees(2.0 * math.atan(0.5 * height / self.focal_px)))
+
+    @property
+    def arrays(self) -> ViewArrays:
+        """The projection, as kernels take it."""
+        return ViewArrays(self.pixel_from_world, np.array(self.eye), self.near)
 
     @property
     def focal_px(self) -> float:
@@ -158,7 +187,7 @@ class Camera:
         return np.stack([np.array(self.right) / f, -np.array(self.up) / f, np.array(self.forward)])
 
 
-def _vec(v: F64) -> tuple[float, float, float]:
+def _vec(v: F64) -> Vector:
     return float(v[0]), float(v[1]), float(v[2])
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hybrid_rt import _threads
-from hybrid_rt._arrays import F32, I32
 from hybrid_rt.camera.pinhole import Camera
+from hybrid_rt.kernels.arrays import F32, I32
 from hybrid_rt.kernels.raster import lists as kernels
 from hybrid_rt.kernels.raster import lists_bins as bin_kernels
 from hybrid_rt.kernels.raster.bins import TILE, prefix_sums
@@ -37,7 +37,7 @@ class PrimitiveLists:
         no list mean nothing.
     margin_px : float
     camera : Camera
-        Whose pixels these are; not always that of the G-buffer, see `rasterize`.
+        Whose pixels these are; not always that of the G-buffer, see `hybrid_rt.Certified`.
     """
 
     prim_id: I32
@@ -70,17 +70,17 @@ def primitive_lists(
 ) -> PrimitiveLists:
     """Return for each pixel the `length` primitives that can be nearest anywhere in its square.
 
-    Arguments as `hybrid_rt.rasterize` has checked them.
+    Arguments as `hybrid_rt.Certified` has checked them.
     """
     width, height, near = camera.width, camera.height, float(camera.near)
     margin = MARGIN_ULPS * 2.0**-24 * (max(width, height) + 1)
     prim_id = np.empty((height, width, length), np.int32)
     nearest = np.empty((height, width, length), np.float32)
     rest = np.empty((height, width), np.float32)
-    vertices, faces = scene.vertices, scene.faces
+    vertices, faces = scene.arrays.vertices, scene.arrays.faces
     planes = np.zeros((len(faces), kernels.PLANE_ROW), np.float32)
-    eye = np.array(camera.eye, np.float64)
-    m, frame = camera.pixel_from_world, camera.world_from_pixel
+    m, eye, _ = camera.arrays
+    frame = camera.world_from_pixel
     tiles_x = -(-width // TILE)
     tiles = tiles_x * -(-height // TILE)
     boxes = np.empty(len(vertices), np.int64)

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt.judge.bvh import build_bvh
-from hybrid_rt.judge.truth import GRAZED, HIT, MISSED
-from hybrid_rt.kernels.judge import bvh as kernels
+from hybrid_rt.judging.bvh import build_bvh
+from hybrid_rt.judging.truth import GRAZED, HIT, MISSED
+from hybrid_rt.kernels.judging import bvh as kernels
 from naive import judge as naive
 
 SQUARES = [

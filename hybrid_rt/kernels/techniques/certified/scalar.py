@@ -54,8 +54,8 @@ from hybrid_rt.kernels.techniques.screen import (
     UNDECIDED,
     clamp,
     edge_s,
+    place,
     ray_t,
-    screen_ray,
 )
 from hybrid_rt.kernels.triangle import frame
 
@@ -338,7 +338,7 @@ def march_chunk(
     height, width = rest.shape
     for i in range(first, last):
         start, stop = np.float64(t_near[i]), np.float64(t_far[i])
-        how, x, y, z0, dx, dy, dz, s_end, z, gz = screen_ray(
+        how, x, y, z0, dx, dy, dz, s_end, z, gz = place(
             np.float64(origin[i, 0]), np.float64(origin[i, 1]), np.float64(origin[i, 2]),
             np.float64(direction[i, 0]), np.float64(direction[i, 1]), np.float64(direction[i, 2]),
             start, math.inf, m, eye, near, width, height,

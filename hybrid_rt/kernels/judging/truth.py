@@ -8,7 +8,7 @@ import numpy as np
 from numba import prange
 
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
-from hybrid_rt.kernels.judge.bvh import STACK
+from hybrid_rt.kernels.judging.bvh import STACK
 from hybrid_rt.kernels.triangle import approach, frame, sheared
 
 NO, YES, UNSURE = 0, 1, 2

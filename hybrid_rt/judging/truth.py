@@ -41,14 +41,14 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hybrid_rt import _check, _threads
-from hybrid_rt._arrays import F64, I32, U8, Bool
+from hybrid_rt._record import writable
 from hybrid_rt.errors import ArgumentError
-from hybrid_rt.judge import exact as _exact
-from hybrid_rt.judge.bvh import Bvh, build_bvh
-from hybrid_rt.kernels.judge import truth as kernels
+from hybrid_rt.judging import exact as _exact
+from hybrid_rt.judging.bvh import Bvh, build_bvh
+from hybrid_rt.kernels.arrays import F32, F64, I32, U8, Bool
+from hybrid_rt.kernels.judging import truth as kernels
 from hybrid_rt.rays.rays import Rays
 from hybrid_rt.scene.mesh import Scene
 
@@ -104,7 +104,7 @@ class Truth:
         _check.instance("scene", scene, Scene)
         _threads.count(threads)
         self._scene, self._threads = scene, threads
-        self._vertices, self._faces = _writable(scene.vertices), _writable(scene.faces)
+        self._vertices, self._faces, _ = scene.arrays
 
     @property
     def scene(self) -> Scene:
@@ -123,13 +123,13 @@ class Truth:
         -------
         Nearest
         """
-        rays = _checked(rays)
+        _check.instance("rays", rays, Rays)
         n = len(rays)
         prim_id, sure = np.empty(n, np.int32), np.empty(n, np.uint8)
         t, error, grazed = np.empty(n), np.empty(n), np.empty(n)
         with _threads.limited(self._threads):
             kernels.nearest(
-                rays.origin, rays.direction, rays.t_near, rays.t_far,
+                *_limited(rays),
                 self._vertices, self._faces, self._largest,
                 self._bvh.prim_id, self._bvh.box, self._bvh.link,
                 prim_id, t, error, grazed, sure,
@@ -161,13 +161,14 @@ class Truth:
         ArgumentError
             A prim_id that the scene does not have.
         """
-        rays, named = _checked(rays), self._named(prim_id, len(rays))
+        _check.instance("rays", rays, Rays)
+        named = self._named(prim_id, len(rays))
         n = len(rays)
         hit, t, error, grazed = np.empty(n, np.uint8), np.empty(n), np.empty(n), np.empty(n)
         area = self._area
         with _threads.limited(self._threads):
             kernels.touch(
-                rays.origin, rays.direction, rays.t_near, rays.t_far, named,
+                *_limited(rays), named,
                 self._vertices, self._faces, area, hit, t, error, grazed,
             )  # fmt: skip
         for i in np.flatnonzero(hit == kernels.UNSURE):
@@ -184,11 +185,12 @@ class Truth:
         ``8 * 2**-24 * (|t| + largest coordinate of origin and triangle / |direction|)``, and 0 for
         no triangle.
         """
-        rays, named = _checked(rays), self._named(prim_id, len(rays))
+        _check.instance("rays", rays, Rays)
+        named = self._named(prim_id, len(rays))
         reach = np.empty(len(rays))
         with _threads.limited(self._threads):
             kernels.reach(
-                rays.origin, rays.direction, named, self._vertices, self._faces, reach
+                *rays.arrays[:2], named, self._vertices, self._faces, reach
             )  # fmt: skip
         return np.where(named >= 0, kernels.TOUCH * np.abs(t) + reach, 0.0)
 
@@ -198,7 +200,7 @@ class Truth:
         if n and not (named.min() >= -1 and named.max() < len(self._scene)):
             bad = named[(named < -1) | (named >= len(self._scene))]
             raise ArgumentError("prim_id", f"from -1 to {len(self._scene) - 1}", str(bad[0]))
-        return _writable(named)
+        return writable(named)
 
     @functools.cached_property
     def _area(self) -> Bool:
@@ -227,7 +229,7 @@ class Truth:
         while True:
             met, met_graze = np.empty(room, np.int32), np.empty(room)
             count = kernels.gather(
-                i, rays.origin, rays.direction, rays.t_near, rays.t_far,
+                i, *_limited(rays),
                 self._vertices, self._faces, self._largest,
                 self._bvh.prim_id, self._bvh.box, self._bvh.link, met, met_graze,
             )  # fmt: skip
@@ -258,13 +260,7 @@ def _exact_ray(rays: Rays, i: int) -> tuple[_exact.Vector, _exact.Vector, float,
     return origin, direction, float(rays.t_near[i]), float(rays.t_far[i])
 
 
-def _checked(rays: Rays) -> Rays:
-    """Return rays whose arrays a kernel may have."""
-    _check.instance("rays", rays, Rays)
-    rays = Rays.from_arrays(rays.origin, rays.direction, rays.pixel, rays.t_near, rays.t_far)
-    return Rays(*(_writable(getattr(rays, name)) for name in rays.__dataclass_fields__))
-
-
-def _writable(value: NDArray[Any]) -> NDArray[Any]:
-    # A read-only array has a type of its own in Numba and would compile every kernel again.
-    return np.require(value, requirements=["C", "W"])
+def _limited(rays: Rays) -> tuple[F32, F32, F32, F32]:
+    """Return what the truth looks at of rays: origins, directions and limits."""
+    origin, direction, _, t_near, t_far = rays.arrays
+    return origin, direction, t_near, t_far

@@ -47,15 +47,14 @@ from typing import Any
 import numpy as np
 
 from hybrid_rt import _check
-from hybrid_rt._arrays import F32, F64, I32, U8, Bool
 from hybrid_rt.camera.pinhole import Camera, project
 from hybrid_rt.errors import ArgumentError
-from hybrid_rt.judge.rate import Rate
-from hybrid_rt.judge.truth import MISSED, Truth
+from hybrid_rt.judging.rate import Rate
+from hybrid_rt.judging.truth import MISSED, Truth
+from hybrid_rt.kernels.arrays import F32, F64, I32, U8, Bool
 from hybrid_rt.rays.hits import Hits
 from hybrid_rt.rays.rays import Rays
 from hybrid_rt.scene.mesh import Scene
-from hybrid_rt.techniques.marched import MarchStatus
 
 
 class Verdict(enum.IntEnum):
@@ -161,15 +160,12 @@ def judge(
         ("camera", camera, Camera),
     ):
         _check.instance(name, value, cls)
+    _check_scene(rays, scene)
     n = len(rays)
     answered = _check.array("resolved", resolved, ("N",), np.bool_)
     _check.same_length("resolved", answered, "rays", n)
     for name, hits in (("claimed", claimed), ("reference", reference)):
-        _check.same_length(name, hits.prim_id, "rays", n)
-        if n and int(hits.prim_id.max()) >= len(scene):
-            raise ArgumentError(
-                f"{name}.prim_id", f"less than {len(scene)}", f"{int(hits.prim_id.max())}"
-            )
+        hits.checked(name, n, len(scene))
     if pixel is None:
         px = np.full((n, 2), -1, np.int32)
     else:
@@ -177,7 +173,7 @@ def judge(
         _check.same_length("pixel", px, "rays", n)
     tolerance = _check.real("pixel_tolerance", pixel_tolerance, above=0.0)
 
-    _check.choice("every", every, (True, False))
+    every = _check.boolean("every", every)
     truth = _truth_of(scene, truth)
 
     judged = Judged(
@@ -255,6 +251,7 @@ def judge_occlusion(
     """
     _check.instance("rays", rays, Rays)
     _check.instance("scene", scene, Scene)
+    _check_scene(rays, scene)
     n = len(rays)
     flags = []
     for name, value in (("claimed", claimed), ("resolved", resolved), ("reference", reference)):
@@ -280,12 +277,19 @@ def judge_occlusion(
     return Judged(verdict, nothing, nothing.copy(), reference_wrong, 1.0)
 
 
+def _check_scene(rays: Rays, scene: Scene) -> None:
+    """Raise if rays were made for another scene."""
+    if rays.scene is not None and not rays.scene.same_as(scene):
+        got = f"rays of another scene, {rays.scene.name!r}"
+        raise ArgumentError("rays", f"rays of scene {scene.name!r}, or of none", got)
+
+
 def _truth_of(scene: Scene, truth: Truth | None) -> Truth:
     """Return a truth of `scene`: the one given, if it is."""
     if truth is None:
         return Truth(scene)
     _check.instance("truth", truth, Truth)
-    if truth.scene is not scene:
+    if not truth.scene.same_as(scene):
         raise ArgumentError("truth", "a Truth of `scene`", f"one of scene {truth.scene.name!r}")
     return truth
 
@@ -352,17 +356,6 @@ def _screen(rays: Rays, t: F64, camera: Camera) -> tuple[F64, Bool]:
     return xy_depth[:, :2], (xy_depth[:, 2] > 0) & np.isfinite(xy_depth).all(axis=1)
 
 
-def alpha(resolved: Any) -> Rate:
-    """Return the share of resolved rays.
-
-    Parameters
-    ----------
-    resolved : (N,) array_like of bool
-    """
-    answered = _check.array("resolved", resolved, ("N",), np.bool_)
-    return Rate.of(int(answered.sum()), len(answered))
-
-
 def rates(judged: Judged) -> dict[str, Rate]:
     """Return all rates of a judged set of rays.
 
@@ -383,41 +376,10 @@ def rates(judged: Judged) -> dict[str, Rate]:
     resolved = judged.verdict != Verdict.UNRESOLVED
     total = int(resolved.sum())
     counts = np.bincount(judged.verdict, minlength=len(Verdict))
-    result = {"alpha": alpha(resolved)}
+    result = {"alpha": Rate.of(total, len(judged))}
     for verdict in Verdict:
         if verdict is not Verdict.UNRESOLVED:
             result[verdict.name.lower()] = Rate.of(int(counts[verdict]), total)
     result["reference_wrong"] = Rate.of(int(judged.reference_wrong.sum()), total)
     result["pixel_error"] = Rate.of(int((judged.error_px > judged.pixel_tolerance).sum()), total)
     return result
-
-
-def by_status(status: Any, judged: Judged) -> dict[str, dict[str, float]]:
-    """Return, for each way that a march can end, how many rays did and what became of them.
-
-    Parameters
-    ----------
-    status : (N,) array_like of int
-        A `MarchStatus` for each ray.
-    judged : Judged
-        Of the same rays.
-
-    Returns
-    -------
-    dict of str to dict of str to float
-        A row for each status, under its name: "rays"; "share" of all rays; the number of rays with
-        each verdict, under its name in lower case; "pixel_error" as in `rates`.
-    """
-    _check.instance("judged", judged, Judged)
-    ended = _check.array("status", status, ("N",), np.uint8)
-    _check.same_length("status", ended, "judged", len(judged))
-    table: dict[str, dict[str, float]] = {}
-    for kind in MarchStatus:
-        of_kind = ended == kind
-        counts = np.bincount(judged.verdict[of_kind], minlength=len(Verdict))
-        rays = int(of_kind.sum())
-        row: dict[str, float] = {"rays": rays, "share": rays / max(1, len(judged))}
-        row |= {verdict.name.lower(): int(counts[verdict]) for verdict in Verdict}
-        row["pixel_error"] = int((judged.error_px[of_kind] > judged.pixel_tolerance).sum())
-        table[kind.name] = row
-    return table

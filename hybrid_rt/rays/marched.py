@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from hybrid_rt._arrays import F32, I32, I64, U8, Bool
+from hybrid_rt import _check
+from hybrid_rt.errors import ArgumentError
+from hybrid_rt.kernels.arrays import F32, I32, I64, U8, Bool, MarchedArrays
+from hybrid_rt.rays.hits import LARGEST
 
 
 class MarchStatus(enum.IntEnum):
@@ -102,7 +106,7 @@ class Marched:
         A `MarchStatus` for each ray.
     resolved : (N,) bool
         Whether the march answers the ray, with a hit or, where `prim_id` is -1, with a miss. What
-        resolves a ray is up to the mode.
+        resolves a ray is up to the technique.
     pixel : (N, 2) int32
         The pixel (x, y) that answers the ray with a hit, else (-1, -1). An answer from lists of
         another view than the G-buffer's has none.
@@ -117,7 +121,7 @@ class Marched:
     steps_by_level : (L,) int64, optional
         The same, summed over the rays, for each level; None where it was not counted.
     tests : int
-        Exact tests of a ray against a primitive, over all rays; only mode "certified" makes any.
+        Exact tests of a ray against a primitive, over all rays; only "certified" makes any.
     work : MarchWork, optional
         What the lanes went through; None where the march has none.
     """
@@ -136,6 +140,7 @@ class Marched:
     @classmethod
     def unfilled(cls, n: int) -> Marched:
         """Return room for `n` rays, with nothing in it yet, for code that writes every row."""
+        n = _check.integer("n", n, least=0, most=LARGEST)
         return cls(
             np.empty(n, np.uint8),
             np.empty(n, np.bool_),
@@ -146,10 +151,19 @@ class Marched:
             np.empty(n, np.int32),
         )
 
+    @classmethod
+    def unresolved(cls, n: int) -> Marched:
+        """Return `n` rays that nothing is known of, for code that writes the others."""
+        marched = cls.unfilled(n)
+        nothing: list[Any] = [MarchStatus.HIDDEN, False, -1, -1, np.inf, 0.0, 0]
+        for array, value in zip(marched.arrays, nothing, strict=True):
+            np.asarray(array).fill(value)
+        return marched
+
     @property
-    def rows(self) -> tuple[U8, Bool, I32, I32, F32, F32, I32]:
+    def arrays(self) -> MarchedArrays:
         """The arrays with a row for each ray, in the order of the attributes, for kernels."""
-        return (
+        return MarchedArrays(
             self.status,
             self.resolved,
             self.pixel,
@@ -158,6 +172,42 @@ class Marched:
             self.t_free,
             self.steps,
         )
+
+    def checked(self, argument: str, n: int, faces: int, width: int, height: int) -> Marched:
+        """Return this if it can be what a screen says of N rays.
+
+        Raises
+        ------
+        ArgumentError
+            Arrays of another length, shape or dtype; an unknown status; a prim_id that the scene
+            or a pixel that the screen does not have; a resolved hit whose t is not finite.
+            `argument` is what it is called in it.
+        """
+        shapes: tuple[tuple[str, tuple[int, ...], type[np.generic]], ...] = (
+            ("status", (n,), np.uint8),
+            ("resolved", (n,), np.bool_),
+            ("pixel", (n, 2), np.int32),
+            ("prim_id", (n,), np.int32),
+            ("t", (n,), np.float32),
+            ("t_free", (n,), np.float32),
+            ("steps", (n,), np.int32),
+        )
+        rows: dict[str, Any] = {
+            name: _check.array(f"{argument}.{name}", getattr(self, name), shape, dtype)
+            for name, shape, dtype in shapes
+        }
+        marched = replace(self, **rows)
+        for name, values, low, high, what in (
+            ("status", marched.status, 0, len(MarchStatus) - 1, "of MarchStatus"),
+            ("prim_id", marched.prim_id, -1, faces - 1, f"{faces} triangles"),
+            ("pixel", marched.pixel[:, 0], -1, width - 1, f"{width} columns"),
+            ("pixel", marched.pixel[:, 1], -1, height - 1, f"{height} rows"),
+        ):
+            _check.in_range(f"{argument}.{name}", values, low, high, what)
+        hit = marched.resolved & (marched.prim_id >= 0)
+        if not np.isfinite(marched.t[hit]).all():
+            raise ArgumentError(f"{argument}.t", "a finite t for every resolved hit", "others")
+        return marched
 
     def __len__(self) -> int:
         return len(self.status)

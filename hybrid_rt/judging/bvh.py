@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hybrid_rt._arrays import F32, I32
-from hybrid_rt.kernels.judge import bvh as kernels
+from hybrid_rt.kernels.arrays import F32, I32
+from hybrid_rt.kernels.judging import bvh as kernels
 
 
 @dataclass(frozen=True, eq=False)
