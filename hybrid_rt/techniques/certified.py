@@ -235,7 +235,6 @@ def _in_lanes(
     with _threads.limited(threads) as workers:
         counted = np.zeros((workers, slots.COUNTERS), np.int64)
         lanes.march(
-            workers,
             (origin.reshape(-1), direction.reshape(-1), t_near, t_far),
             (width, height),
             _box(scene, camera),
@@ -273,7 +272,7 @@ def _one_by_one(
         steps_by_level = np.zeros((workers, len(data.pyramid)), np.int64)
         tests = np.zeros((workers, 1), np.int64)
         scalar.march(
-            workers, origin, direction, t_near, t_far,
+            origin, direction, t_near, t_far,
             lists.prim_id, lists.nearest, lists.rest, lists.planes,
             pyramid.cells, pyramid.offsets[:levels], pyramid.pitches,
             scene.arrays.vertices, scene.arrays.faces, *_box(scene, camera), *limits,

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid_rt.kernels._jit import kernel
+from hybrid_rt.kernels._jit import called
 from hybrid_rt.kernels.techniques.driver import marches
 from hybrid_rt.kernels.techniques.screen import (
     EXHAUSTED,
@@ -22,7 +22,7 @@ from hybrid_rt.kernels.techniques.screen import (
 )
 
 
-@kernel
+@called
 def tilted_plane_s(
     i, j, depth, ddx, ddy, x0, y0, z0, dx, dy, dz, inv_x, inv_y, step_x, step_y, s_start, s_end
 ):

@@ -35,10 +35,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import prange
 
-from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
-from hybrid_rt.kernels._queue import fetch_add
+from hybrid_rt.kernels._jit import called, inlined, parallel_kernel
+from hybrid_rt.kernels._queue import take
 from hybrid_rt.kernels.raster.lists_planes import (
     DEPTH,
     ERROR,
@@ -334,7 +333,7 @@ def walk(
     return status, -1, -1, -1, math.inf, s / scale, steps, tests
 
 
-@kernel
+@called
 def march_chunk(
     first, last, origin, direction, t_near, t_far, prim_id, nearest, rest, planes,
     cells, offsets, pitches, vertices, faces, m, eye, near, spread, low, high,
@@ -390,22 +389,20 @@ def march_chunk(
 
 @parallel_kernel
 def march(
-    workers, origin, direction, t_near, t_far, prim_id, nearest, rest, planes,
+    share, origin, direction, t_near, t_far, prim_id, nearest, rest, planes,
     cells, offsets, pitches, vertices, faces, m, eye, near, spread, low, high,
     max_steps, max_tests, any_hit,
     status, resolved, pixel, prim, t, t_free, steps, steps_by_level, tests,
 ):  # fmt: skip
     """March rays (N, 3); outputs (N,), steps_by_level (workers, L), tests (workers, 1)."""
     n = origin.shape[0]
-    taken = np.zeros(1, np.int64)
-    for worker in prange(workers):
-        first = fetch_add(taken.ctypes.data, CHUNK)
-        while first < n:
-            march_chunk(
-                first, min(n, first + CHUNK), origin, direction, t_near, t_far,
-                prim_id, nearest, rest, planes, cells, offsets, pitches, vertices, faces,
-                m, eye, near, spread, low, high, max_steps, max_tests, any_hit,
-                status, resolved, pixel, prim, t, t_free, steps, steps_by_level[worker],
-                tests[worker],
-            )  # fmt: skip
-            first = fetch_add(taken.ctypes.data, CHUNK)
+    first = take(share, CHUNK)
+    while first < n:
+        march_chunk(
+            first, min(n, first + CHUNK), origin, direction, t_near, t_far,
+            prim_id, nearest, rest, planes, cells, offsets, pitches, vertices, faces,
+            m, eye, near, spread, low, high, max_steps, max_tests, any_hit,
+            status, resolved, pixel, prim, t, t_free, steps, steps_by_level[share.worker],
+            tests[share.worker],
+        )  # fmt: skip
+        first = take(share, CHUNK)
