@@ -2,8 +2,8 @@
 
 No fast-math at all: infinities and NaN mean something here (a background pixel, a ray without an
 answer), and the oracles are compared bit for bit, which reassociation and contraction would break.
-The error model is NumPy's, so that 1 / 0 is an infinity and not a branch. Compiled code is cached
-beside the sources.
+The error model is NumPy's, so that 1 / 0 is an infinity and not a branch. Compiled code is kept,
+see `hybrid_rt.kernels._cache`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any
 
 from numba import njit
 
+from hybrid_rt.kernels._cache import KernelCache
 from hybrid_rt.kernels._pieces import piece, without_literals
 from hybrid_rt.kernels._team import on_all_threads
 
@@ -21,7 +22,9 @@ OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": False}
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function that is called from Python, or from other kernels, on one thread."""
-    return without_literals(njit(cache=True, no_cfunc_wrapper=True, **OPTIONS)(function))
+    dispatcher = without_literals(njit(no_cfunc_wrapper=True, **OPTIONS)(function))
+    dispatcher._cache = KernelCache(function)
+    return dispatcher
 
 
 def parallel_kernel(function: Callable[..., None]) -> Callable[..., None]:
