@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
+from support.screens import through
 from naive import slabs, strict
 from naive.walk import View
 from support import synthetic
@@ -87,7 +88,7 @@ def compare(oracle, mode, names, buffer, rays):
     view = View(
         buffer.depth, buffer.ddx, buffer.ddy, camera.pixel_from_world, camera.eye, camera.near
     )
-    marched = hrt.march(rays, buffer, hrt.build_depth_pyramid(buffer), mode)
+    marched = through(rays, buffer, mode)
     parameters = {name: getattr(mode, name) for name in names}
     compared = hits = 0
     for i in range(len(rays)):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
+from support.screens import through
 from hybrid_rt_scenes import get_scene
 
 # The bounds are wide: they tell a technique that works from one that does not. Share of rays
@@ -33,7 +34,7 @@ def counted():
     counts = {}
     print()
     for name in BOUNDS:
-        marched = hrt.march(rays, buffer, pyramid, name)
+        marched = through(rays, buffer, name)
         hit = marched.prim_id >= 0
         near = np.abs(true_pixel - marched.pixel).max(axis=1) <= 1
         wrong = hit & ((truth.prim_id < 0) | ~near)
