@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import hybrid_rt as hrt
-from hybrid_rt.kernels.techniques.certified import lanes
+from hybrid_rt.kernels.techniques.certified import slots
 from hybrid_rt_bench import roofline, stats, strongest
 from hybrid_rt_bench.measure import CellError, LoadedScene
 from hybrid_rt_bench.primary import primary_rays
@@ -69,7 +69,7 @@ def measure_cell(
     Raises
     ------
     CellError
-        The camera sees no surface, or the view is too large for the lanes.
+        The camera sees no surface, or the view is too large for the slots.
     """
     gbuffer = hrt.rasterize(loaded.scene, camera, lists=experiment.lists, threads=threads)
     pyramid = hrt.build_depth_pyramid(gbuffer, conservative=True, threads=threads)
@@ -175,24 +175,24 @@ def work_columns(marched: hrt.Marched, gbuffer: hrt.GBuffer, pyramid: hrt.DepthP
     assert lists is not None
     # Of the numbers of a plane or a triangle, which lie side by side, one is to be waited for.
     gathered = {
-        "pyramid": (work.steps * lanes.CELLS_A_STEP, 1),
-        "lists": (work.entries * lanes.NUMBERS_AN_ENTRY + work.rests * lanes.NUMBERS_A_REST, 1),
-        "planes": (work.planes * lanes.NUMBERS_A_PLANE, lanes.NUMBERS_A_PLANE),
-        "corners": (work.tests * lanes.NUMBERS_A_TEST, lanes.NUMBERS_A_TEST),
+        "pyramid": (work.steps * slots.CELLS_A_STEP, 1),
+        "lists": (work.entries * slots.NUMBERS_AN_ENTRY + work.rests * slots.NUMBERS_A_REST, 1),
+        "planes": (work.planes * slots.NUMBERS_A_PLANE, slots.NUMBERS_A_PLANE),
+        "corners": (work.tests * slots.NUMBERS_A_TEST, slots.NUMBERS_A_TEST),
         "slots": (
-            work.refills * lanes.ROWS_A_REFILL
-            + work.looks * lanes.ROWS_A_LOOK
-            + work.tests * lanes.ROWS_A_TEST,
+            work.refills * slots.ROWS_A_REFILL
+            + work.looks * slots.ROWS_A_LOOK
+            + work.tests * slots.ROWS_A_TEST,
             1,
         ),
     }
-    row_bytes = 4 * (lanes.F32_ROWS + lanes.I32_ROWS) + 8 * lanes.F64_ROWS
+    row_bytes = 4 * (slots.F32_ROWS + slots.I32_ROWS) + 8 * slots.F64_ROWS
     sizes = {
         "pyramid": 4 * int((pyramid.widths * pyramid.heights).sum()),
         "lists": lists.prim_id.nbytes + lists.nearest.nbytes + lists.rest.nbytes,
         "planes": lists.planes.nbytes,
         "corners": gbuffer.scene.corners.nbytes,
-        "slots": lanes.STRIDE * row_bytes,
+        "slots": slots.STRIDE * row_bytes,
     }
     columns: Row = dataclasses.asdict(work)
     columns |= {f"busy_{stage}": share for stage, share in work.busy.items()}

@@ -26,6 +26,7 @@ HYBRID = "tests/library/hybrid/test_hybrid.py"
 LANES = "tests/library/techniques/test_certified_lanes.py"
 PLANES = "tests/library/raster/test_lists_precision.py"
 BINS = "hybrid_rt/kernels/raster/lists_bins.py"
+FACE_PLANES = "hybrid_rt/kernels/raster/lists_planes.py"
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,8 @@ class Mutant:
 
 
 MUTANTS = (
-    Mutant("lists at pixel centres", LISTS, "half = 0.5 + margin", "half = 0.0", TEST_LISTS),
+    Mutant("lists at pixel centres", FACE_PLANES,
+           "half = 0.5 + margin", "half = 0.0", TEST_LISTS),
     Mutant("no margin", "hybrid_rt/raster/lists.py",
            "MARGIN_ULPS = 16", "MARGIN_ULPS = 0", ROUNDING),
     Mutant(
@@ -89,7 +91,7 @@ MUTANTS = (
            PLANES),
     Mutant("plane looked at in one end only", WALK, "front = min(above, then) > error",
            "front = above > error", PLANES),
-    Mutant("planes without the margin", LISTS,
+    Mutant("planes without the margin", FACE_PLANES,
            "(steep_x + steep_y) * margin + reach", "reach", PLANES),
     Mutant("skipped rays taken for free", "hybrid_rt/kernels/techniques/certified/lanes.py",
            "unmarched(i, SKIPPED, F32(0.0), out)", "unmarched(i, MISS, F32(0.0), out)",

@@ -6,12 +6,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from hybrid_rt.techniques.modes import MODES
 
 import hybrid_rt as hrt
-from support.screens import through
-from hybrid_rt.techniques.modes import MODES
 from hybrid_rt_scenes.hard_cases import get_hard_case, grade, hard_case_names, truth
 from naive import triangle as naive
+from support.screens import through
 
 NAMES = hard_case_names()
 

@@ -10,7 +10,7 @@ import pytest
 
 import hybrid_rt as hrt
 from hybrid_rt.kernels.simd import WIDTH
-from hybrid_rt.kernels.techniques.certified import lanes
+from hybrid_rt.kernels.techniques.certified import slots
 from hybrid_rt_bench import cli, rates, results, roofline, roofline_cell, roofline_run
 from hybrid_rt_bench import rates_kernels as kernels
 from hybrid_rt_bench.measure import prepare
@@ -198,7 +198,7 @@ def test_a_view_has_its_work_and_its_sizes(record):
     assert row["planes_places"] == marched.work.planes
     assert row["planes_bytes"] + row["lists_bytes"] == gbuffer.lists.nbytes
     assert row["corners_bytes"] == 36 * len(scene)
-    assert row["slots_bytes"] == lanes.STRIDE * 192
+    assert row["slots_bytes"] == slots.STRIDE * 192
     assert row["pyramid_bytes"] < pyramid.data.nbytes
     gathered = sum(row[f"{name}_gathered"] for name in roofline.STRUCTURES)
     assert row["touched_bytes"] == 4 * gathered + (32 + 26) * len(marched)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from support.screens import through
 from hybrid_rt.kernels.hybrid import CHUNK, answer_hits
+from support.screens import through
 
 S = hrt.MarchStatus
 

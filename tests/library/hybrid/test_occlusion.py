@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from support.screens import through
 from hybrid_rt.kernels.hybrid import CHUNK
+from support.screens import through
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,14 @@ from fractions import Fraction
 import numpy as np
 
 import hybrid_rt as hrt
-from hybrid_rt.kernels.raster.lists import DEPTH, ERROR, REFERENCE_X, REFERENCE_Y, SLOPE_X, SLOPE_Y
+from hybrid_rt.kernels.raster.lists_planes import (
+    DEPTH,
+    ERROR,
+    REFERENCE_X,
+    REFERENCE_Y,
+    SLOPE_X,
+    SLOPE_Y,
+)
 from hybrid_rt.kernels.techniques.certified import scalar as kernels
 from naive import lists as naive
 from support.soup import random_scene

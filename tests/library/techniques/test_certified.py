@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from support.screens import through
 from naive import triangle as exact
+from support.screens import through
 from support.soup import other_views, prepare, random_rays, random_scene
 
 S = hrt.MarchStatus

@@ -13,10 +13,12 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from support.screens import through
-from hybrid_rt.kernels.techniques.certified import lanes as lanes_of
+from hybrid_rt.kernels.techniques.certified import look as looks
+from hybrid_rt.kernels.techniques.certified import slots
+from hybrid_rt.kernels.techniques.certified.step import step as step_kernel
 from hybrid_rt_scenes.hard_cases import get_hard_case, hard_case_names
 from support.machines import MACHINES, machine
+from support.screens import through
 from support.soup import other_views, prepare, random_rays, random_scene
 
 S = hrt.MarchStatus
@@ -37,7 +39,7 @@ def assert_same(one, other, rows=slice(None)):
 def assert_work_is_that_of(marched):
     """What the lanes counted fits the march, and together."""
     work = marched.work
-    assert work.lanes == lanes_of.W
+    assert work.lanes == slots.W
     assert work.steps == marched.steps.sum()
     assert work.tests == marched.tests
     assert work.passes <= work.looks <= work.steps + work.tests
@@ -146,19 +148,19 @@ def test_threads_change_nothing(probes):
 def test_what_a_lane_gathers_is_what_is_written_down():
     step, look, test, corner = (
         inspect.getsource(stage.py_func)
-        for stage in (lanes_of.step, lanes_of.look, lanes_of.test, lanes_of.corner)
+        for stage in (step_kernel, looks.look, looks.test, looks.corner)
     )
-    corners = inspect.getsource(lanes_of.test_primitives.py_func).count(" corner(")
-    assert step.count("gather(cells") == lanes_of.CELLS_A_STEP
-    assert step.count("gather(slots_") == lanes_of.ROWS_A_REFILL
+    corners = inspect.getsource(looks.test_primitives.py_func).count(" corner(")
+    assert step.count("gather(cells") == slots.CELLS_A_STEP
+    assert step.count("gather(slots_") == slots.ROWS_A_REFILL
     of_entry = look.count("gather(prim_id") + look.count("gather(nearest")
-    assert of_entry == lanes_of.NUMBERS_AN_ENTRY
-    assert look.count("gather(rest") == lanes_of.NUMBERS_A_REST
-    assert look.count("gather(planes") == lanes_of.NUMBERS_A_PLANE
-    assert look.count(" at(slots_") == lanes_of.ROWS_A_LOOK + 1
+    assert of_entry == slots.NUMBERS_AN_ENTRY
+    assert look.count("gather(rest") == slots.NUMBERS_A_REST
+    assert look.count("gather(planes") == slots.NUMBERS_A_PLANE
+    assert look.count(" at(slots_") == slots.ROWS_A_LOOK + 1
     of_hit = test[test.index("if simd.any_(hit)") :].count("at(slots_")
-    assert test.count("at(slots_") - of_hit == lanes_of.ROWS_A_TEST - 1
-    assert corners * corner.count("gather(corners") == lanes_of.NUMBERS_A_TEST
+    assert test.count("at(slots_") - of_hit == slots.ROWS_A_TEST - 1
+    assert corners * corner.count("gather(corners") == slots.NUMBERS_A_TEST
     written = sum(stage.count("gather(") for stage in (step, look))
     assert written == 1 + 14 + 2 + 1 + 6  # whatever else is gathered is to be added to them
 

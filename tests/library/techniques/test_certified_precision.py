@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from support.screens import through
 from hybrid_rt.kernels.techniques.certified import scalar as kernels
+from support.screens import through
 
 S = hrt.MarchStatus
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from support.screens import through
 from hybrid_rt.kernels.techniques import screen as kernels
 from naive import march as naive
 from support import synthetic
+from support.screens import through
 
 S = hrt.MarchStatus
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from support.screens import through
 from hybrid_rt_scenes import get_scene
 from naive import march as naive
+from support.screens import through
 
 VIEWS = [("sponza", 0), ("sponza", 2), ("bistro", 0), ("bistro", 1)]
 

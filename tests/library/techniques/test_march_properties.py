@@ -5,9 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybrid_rt as hrt
-from support.screens import through
 from hybrid_rt import _threads
 from support import synthetic
+from support.screens import through
 
 FIELDS = ("status", "resolved", "pixel", "prim_id", "t", "t_free", "steps")
 seeds = st.integers(0, 2**32 - 1)

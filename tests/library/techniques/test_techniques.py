@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from support.screens import through
 from support import synthetic
+from support.screens import through
 
 S = hrt.MarchStatus
 NEAR = 0.1
@@ -207,10 +207,7 @@ def test_slope_frees_rays_that_leave_a_floor():
     origin = hrt.unproject(buffer.camera, start)
     rays = hrt.Rays.from_arrays(origin, np.tile([0.0, 0.75, -1.0], (len(origin), 1)), pixel)
     pyramid = hrt.build_depth_pyramid(buffer)
-    hidden = [
-        (through(rays, buffer, mode).status == S.HIDDEN).sum()
-        for mode in ("paper", "slope")
-    ]
+    hidden = [(through(rays, buffer, mode).status == S.HIDDEN).sum() for mode in ("paper", "slope")]
     assert hidden[0] > 100
     assert hidden[1] == 0
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from support.screens import through
 from naive import slabs, strict
 from naive.walk import View
 from support import synthetic
+from support.screens import through
 
 # The kernels compute in float32 with coordinates of tens of pixels: decisions that hang on less
 # than this relative distance may go either way.

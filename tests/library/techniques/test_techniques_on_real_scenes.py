@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from support.screens import through
 from hybrid_rt_scenes import get_scene
+from support.screens import through
 
 # The bounds are wide: they tell a technique that works from one that does not. Share of rays
 # answered with a hit, and the largest share of those that may lie more than a pixel off.

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybrid_rt as hrt
-from support.screens import through
 from hybrid_rt import _threads
 from support import synthetic
+from support.screens import through
 
 FIELDS = ("status", "resolved", "pixel", "prim_id", "t", "t_free", "steps")
 S = hrt.MarchStatus
@@ -132,9 +132,7 @@ def test_switches_of_hiz_touch_only_their_own_rays(seed):
 @given(seeds)
 def test_a_thicker_slab_never_loses_a_dda_hit(seed):
     _, buffer, pyramid, rays = case(seed)
-    hits = [
-        through(rays, buffer, hrt.PixelDDA(t)).resolved for t in (0.01, 0.1, 1.0, 10.0)
-    ]
+    hits = [through(rays, buffer, hrt.PixelDDA(t)).resolved for t in (0.01, 0.1, 1.0, 10.0)]
     for thin, thick in itertools.pairwise(hits):
         assert thick[thin].all()
 
