@@ -11,6 +11,7 @@ from hybrid_rt.techniques.modes import MODES
 import hybrid_rt as hrt
 from hybrid_rt_scenes.hard_cases import get_hard_case, grade, hard_case_names, truth
 from naive import triangle as naive
+from support.screens import through
 
 NAMES = hard_case_names()
 
@@ -66,7 +67,7 @@ def graded(mode, name):
     if case.max_steps is not None and hasattr(chosen, "max_steps"):
         chosen = dataclasses.replace(chosen, max_steps=case.max_steps)
     pyramid = hrt.build_depth_pyramid(case.gbuffer)
-    return grade(case, hrt.march(case.rays, case.gbuffer, pyramid, chosen), exact=mode in EXACT)
+    return grade(case, through(case.rays, case.gbuffer, chosen), exact=mode in EXACT)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -78,7 +79,7 @@ def test_certified_is_right_from_lists_of_another_view(name):
     for view in (coarse, camera.widened(1.5)):
         gbuffer = hrt.rasterize(case.scene, camera, lists=8, lists_camera=view)
         pyramid = hrt.build_depth_pyramid(gbuffer, conservative=True)
-        result = grade(case, hrt.march(case.rays, gbuffer, pyramid, mode), exact=True)
+        result = grade(case, through(case.rays, gbuffer, mode), exact=True)
         assert result.passed, result
 
 

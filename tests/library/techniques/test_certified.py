@@ -5,6 +5,7 @@ import pytest
 
 import hybrid_rt as hrt
 from naive import triangle as exact
+from support.screens import through
 from support.soup import other_views, prepare, random_rays, random_scene
 
 S = hrt.MarchStatus
@@ -19,7 +20,7 @@ def kernel(request, monkeypatch):
 
 def certified(scene, camera, rays, lists=4, mode="certified", **kwargs):
     gbuffer, pyramid = prepare(scene, camera, lists)
-    return hrt.march(rays, gbuffer, pyramid, mode, **kwargs)
+    return through(rays, gbuffer, mode, **kwargs)
 
 
 def triangles(scene):
@@ -81,13 +82,13 @@ def test_every_answer_from_lists_of_another_view_is_the_exact_one(seed):
     gbuffer, pyramid = prepare(scene, camera, (2, 16)[seed % 2], view)
     assert gbuffer.lists.camera == view
     assert pyramid.level(0).shape == (view.height, view.width)
-    marched = hrt.march(rays, gbuffer, pyramid, "certified")
+    marched = through(rays, gbuffer, "certified")
     assert_true(scene, rays, marched)
     assert marched.resolved.any()
     assert (marched.pixel == -1).all()
     plain = hrt.rasterize(scene, camera)
     assert np.array_equal(gbuffer.depth, plain.depth)
-    result = hrt.trace_hybrid(rays, gbuffer, pyramid, hrt.BruteForceTracer(scene), "certified")
+    result = hrt.trace_hybrid(rays, hrt.prepare(gbuffer, "certified"), hrt.BruteForceTracer(scene))
     assert_true(scene, rays, result.marched)
     assert np.array_equal(result.hits.prim_id, hrt.BruteForceTracer(scene).intersect(rays).prim_id)
 
@@ -100,7 +101,7 @@ def test_a_guard_band_keeps_rays_in_sight_that_leave_the_screen():
     gone, alpha = [], []
     for factor in (1.0, 2.0, 4.0):
         gbuffer, pyramid = prepare(scene, camera, 16, camera.widened(factor))
-        marched = hrt.march(rays, gbuffer, pyramid, "certified")
+        marched = through(rays, gbuffer, "certified")
         gone.append((marched.status == S.OFFSCREEN).mean())
         alpha.append(marched.resolved.mean())
     assert gone[0] > gone[1] > gone[2]
@@ -116,7 +117,7 @@ def test_lists_of_another_view_that_cannot_be():
     gbuffer, pyramid = prepare(scene, CAMERA, 4, CAMERA.resized(8, 4))
     rays = hrt.mirror_rays(gbuffer)
     with pytest.raises(hrt.ArgumentError, match="of the G-buffer's lists, 16 by 16 pixels"):
-        hrt.march(rays, hrt.rasterize(scene, CAMERA, lists=4), pyramid, "certified")
+        through(rays, hrt.rasterize(scene, CAMERA, lists=4), "certified")
 
 
 def test_long_lists_answer_what_short_ones_cannot():
@@ -257,7 +258,7 @@ def test_what_is_missing_is_made():
     camera = hrt.Camera.look_at((0, 0, 6), (0, 0, 0), width=32, height=24)
     plain = hrt.rasterize(scene, camera)
     rays = hrt.mirror_rays(plain)
-    made = hrt.march(rays, plain, hrt.build_depth_pyramid(plain), "certified")
+    made = through(rays, plain, "certified")
     given = certified(scene, camera, rays, 8)
     for name in ("status", "prim_id", "t", "t_free", "steps"):
         assert np.array_equal(getattr(made, name), getattr(given, name)), name
@@ -270,10 +271,10 @@ def test_depth_at_the_centres_is_never_read():
     camera = hrt.Camera.look_at((0, 0, 6), (0, 0, 0), width=32, height=24)
     gbuffer, pyramid = prepare(scene, camera)
     rays = hrt.mirror_rays(gbuffer)
-    before = hrt.march(rays, gbuffer, pyramid, "certified")
+    before = through(rays, gbuffer, "certified")
     gbuffer.depth[:] = 0.123
     gbuffer.prim_id[:] = 0
-    after = hrt.march(rays, gbuffer, pyramid, "certified")
+    after = through(rays, gbuffer, "certified")
     assert np.array_equal(before.prim_id, after.prim_id)
 
 
@@ -284,7 +285,7 @@ def test_a_conservative_pyramid_is_not_the_papers():
     with pytest.raises(
         hrt.ArgumentError, match="pyramid: expected one of the depths at pixel cent"
     ):
-        hrt.march(rays, gbuffer, pyramid, "paper")
+        through(rays, gbuffer, "paper")
     with pytest.raises(hrt.ArgumentError, match="gbuffer: expected one with lists"):
         hrt.build_depth_pyramid(hrt.rasterize(scene, CAMERA), conservative=True)
 
@@ -315,8 +316,8 @@ def test_threads_change_nothing():
     camera = hrt.Camera.look_at((0, 0, 6), (0, 0, 0), width=64, height=48)
     gbuffer, pyramid = prepare(scene, camera)
     rays = hrt.mirror_rays(gbuffer)
-    one = hrt.march(rays, gbuffer, pyramid, "certified", threads=1)
-    all_ = hrt.march(rays, gbuffer, pyramid, "certified", threads=_threads.available())
+    one = through(rays, gbuffer, "certified", threads=1)
+    all_ = through(rays, gbuffer, "certified", threads=_threads.available())
     for name in (
         "status",
         "resolved",

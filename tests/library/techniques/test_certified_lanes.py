@@ -18,6 +18,7 @@ from hybrid_rt.kernels.techniques.certified import slots
 from hybrid_rt.kernels.techniques.certified.step import step as step_kernel
 from hybrid_rt_scenes.hard_cases import get_hard_case, hard_case_names
 from support.machines import MACHINES, machine
+from support.screens import through
 from support.soup import other_views, prepare, random_rays, random_scene
 
 S = hrt.MarchStatus
@@ -50,9 +51,7 @@ def assert_work_is_that_of(marched):
 
 def assert_vectors_change_nothing(rays, gbuffer, pyramid, any_hit=False, **parameters):
     lanes, single = (
-        hrt.march(
-            rays, gbuffer, pyramid, hrt.Certified(vectors=vectors, **parameters), any_hit=any_hit
-        )
+        through(rays, gbuffer, hrt.Certified(vectors=vectors, **parameters), any_hit=any_hit)
         for vectors in (True, False)
     )
     assert_same(lanes, single)
@@ -137,7 +136,7 @@ def test_the_hard_set(name):
 def test_threads_change_nothing(probes):
     rays, gbuffer, pyramid = random_case(6, 20000)
     mode = hrt.Certified(probes=probes)
-    one, two = (hrt.march(rays, gbuffer, pyramid, mode, threads=threads) for threads in (1, 2))
+    one, two = (through(rays, gbuffer, mode, threads=threads) for threads in (1, 2))
     assert_same(one, two)
     assert one.tests == two.tests
     done, again = (dataclasses.asdict(marched.work) for marched in (one, two))
@@ -202,8 +201,8 @@ def test_probes_decide_what_is_marched_and_change_no_answer(probes, n):
     away = np.arange(n) // 16 % 2 == 0
     rays.origin[away] = gbuffer.camera.eye
     rays.direction[away] = -np.array(gbuffer.camera.forward)
-    everything = hrt.march(rays, gbuffer, pyramid, hrt.Certified())
-    marched = hrt.march(rays, gbuffer, pyramid, hrt.Certified(probes=probes))
+    everything = through(rays, gbuffer, hrt.Certified())
+    marched = through(rays, gbuffer, hrt.Certified(probes=probes))
     skipped = marched.status == S.SKIPPED
     assert 0.2 < skipped.mean() < 0.9
     assert_same(marched, everything, ~skipped)
@@ -235,8 +234,8 @@ def test_arrays_that_cannot_be_written_or_have_gaps():
     others.t_far.flags.writeable = False
     assert_vectors_change_nothing(others, gbuffer, pyramid)
     assert_same(
-        hrt.march(rays, gbuffer, pyramid, "certified"),
-        hrt.march(others, gbuffer, pyramid, "certified"),
+        through(rays, gbuffer, "certified"),
+        through(others, gbuffer, "certified"),
     )
 
 

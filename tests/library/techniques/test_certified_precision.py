@@ -7,6 +7,7 @@ import pytest
 
 import hybrid_rt as hrt
 from hybrid_rt.kernels.techniques.certified import scalar as kernels
+from support.screens import through
 
 S = hrt.MarchStatus
 
@@ -49,7 +50,7 @@ def test_a_ray_that_float32_puts_into_the_next_row_meets_the_wires_of_its_own():
     gbuffer = hrt.rasterize(scene, camera, lists=2)
     pyramid = hrt.build_depth_pyramid(gbuffer, conservative=True)
     rays = hrt.Rays.from_arrays(origins, np.tile((1.0, 0, 0), (len(origins), 1)))
-    marched = hrt.march(rays, gbuffer, pyramid, "certified")
+    marched = through(rays, gbuffer, "certified")
     assert (marched.status == S.HIT).all()
     assert (marched.prim_id == 1 + np.arange(len(rays))).all()
 
@@ -80,7 +81,7 @@ def test_bounds_are_rounded_up():
     for k in range(200):
         z = F(1.0 + k * 0.037)
         points = np.array([(-99, -99, -z), (99, -99, -z), (0, 99, -z)], np.float32)
-        lists = hrt.rasterize(hrt.Scene.from_arrays(points, [[0, 1, 2]]), camera, lists=1).lists
+        lists = lists_of(hrt.Scene.from_arrays(points, [[0, 1, 2]]), camera, 1)
         true = Fraction(0.1) / Fraction(float(z))
         assert Fraction(float(lists.nearest[2, 2, 0])) >= true
         down += F(float(true)) < true
@@ -100,6 +101,6 @@ def test_a_ray_and_the_plane_that_it_starts_on():
     gbuffer = hrt.rasterize(scene, camera, lists=4)
     pyramid = hrt.build_depth_pyramid(gbuffer, conservative=True)
     rays = hrt.mirror_rays(gbuffer)
-    marched = hrt.march(rays, gbuffer, pyramid, "certified")
+    marched = through(rays, gbuffer, "certified")
     assert not (marched.status == S.HIT).any()
     assert (marched.status == S.MISS).mean() > 0.8

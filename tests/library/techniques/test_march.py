@@ -7,6 +7,7 @@ import hybrid_rt as hrt
 from hybrid_rt.kernels.techniques import screen as kernels
 from naive import march as naive
 from support import synthetic
+from support.screens import through
 
 S = hrt.MarchStatus
 
@@ -18,7 +19,7 @@ MARGIN = 2e-5
 def march_one(buffer, origin, direction, pixel=(-1, -1), **kwargs):
     limits = {k: [kwargs.pop(k)] for k in ("t_near", "t_far") if k in kwargs}
     rays = hrt.Rays.from_arrays([origin], np.array([direction], float), [pixel], **limits)
-    return hrt.march(rays, buffer, hrt.build_depth_pyramid(buffer), **kwargs)
+    return through(rays, buffer, **kwargs)
 
 
 def wall(width=16, height=16, depth=0.02):
@@ -42,7 +43,7 @@ def test_agrees_with_the_oracle(seed, samples):
         width, height = (int(n) for n in rng.integers(1, 40, 2))
         buffer = synthetic.random_gbuffer(rng, width, height)
         rays = synthetic.random_rays(rng, buffer, 60)
-        marched = hrt.march(rays, buffer, hrt.build_depth_pyramid(buffer), hrt.Paper(samples))
+        marched = through(rays, buffer, hrt.Paper(samples))
         camera = buffer.camera
         for i in range(len(rays)):
             expected = naive.march(
@@ -128,7 +129,7 @@ def test_a_ray_does_not_meet_the_surface_it_starts_on():
     start = np.concatenate([pixel + 0.5, depth.reshape(-1, 1)], axis=1)
     origin = hrt.unproject(buffer.camera, start)
     rays = hrt.Rays.from_arrays(origin, np.tile([0.0, 1.0, 0.1], (len(origin), 1)), pixel)
-    marched = hrt.march(rays, buffer, hrt.build_depth_pyramid(buffer))
+    marched = through(rays, buffer)
     assert not marched.resolved.any()
     assert (marched.status == S.OFFSCREEN).any()
 
@@ -156,7 +157,7 @@ def test_steps_are_counted_by_level():
     buffer = synthetic.random_gbuffer(rng, 37, 23)
     rays = synthetic.random_rays(rng, buffer, 500)
     pyramid = hrt.build_depth_pyramid(buffer)
-    marched = hrt.march(rays, buffer, pyramid)
+    marched = through(rays, buffer)
     assert marched.steps_by_level.shape == (len(pyramid),)
     assert marched.steps_by_level.sum() == marched.steps.sum() > 0
 
@@ -185,7 +186,7 @@ def test_the_default_budget_is_never_used_up():
 def test_nothing_to_march():
     rays = hrt.Rays.from_arrays(np.empty((0, 3)), np.empty((0, 3)))
     buffer = wall()
-    marched = hrt.march(rays, buffer, hrt.build_depth_pyramid(buffer))
+    marched = through(rays, buffer)
     assert len(marched) == 0
 
 
@@ -214,4 +215,4 @@ def test_bad_parameters(parameters, argument):
 def test_the_pyramid_of_another_view_is_refused():
     rays = hrt.Rays.from_arrays(np.zeros((1, 3)), np.ones((1, 3)))
     with pytest.raises(hrt.ArgumentError, match="16 by 16 pixels at level 0, got one of 8 by 16"):
-        hrt.march(rays, wall(), hrt.build_depth_pyramid(wall(8, 16)))
+        through(rays, wall())

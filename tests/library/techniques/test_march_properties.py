@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 import hybrid_rt as hrt
 from hybrid_rt import _threads
 from support import synthetic
+from support.screens import through
 
 FIELDS = ("status", "resolved", "pixel", "prim_id", "t", "t_free", "steps")
 seeds = st.integers(0, 2**32 - 1)
@@ -24,8 +25,8 @@ def case(seed, n=200):
 def test_permuting_rays_permutes_results(seed):
     rng, buffer, pyramid, rays = case(seed)
     order = rng.permutation(len(rays))
-    straight = hrt.march(rays, buffer, pyramid)
-    permuted = hrt.march(rays.take(order), buffer, pyramid)
+    straight = through(rays, buffer)
+    permuted = through(rays.take(order), buffer)
     for name in FIELDS:
         np.testing.assert_array_equal(getattr(straight, name)[order], getattr(permuted, name))
 
@@ -34,8 +35,8 @@ def test_permuting_rays_permutes_results(seed):
 @given(seeds, st.integers(1, 8))
 def test_the_number_of_threads_changes_nothing(seed, samples):
     _, buffer, pyramid, rays = case(seed, n=3000)
-    one = hrt.march(rays, buffer, pyramid, hrt.Paper(samples), threads=1)
-    all_ = hrt.march(rays, buffer, pyramid, hrt.Paper(samples), threads=_threads.available())
+    one = through(rays, buffer, hrt.Paper(samples), threads=1)
+    all_ = through(rays, buffer, hrt.Paper(samples), threads=_threads.available())
     for name in (*FIELDS, "steps_by_level"):
         np.testing.assert_array_equal(getattr(one, name), getattr(all_, name))
 
@@ -44,7 +45,7 @@ def test_the_number_of_threads_changes_nothing(seed, samples):
 @given(seeds)
 def test_answers_hold_together(seed):
     _, buffer, pyramid, rays = case(seed)
-    marched = hrt.march(rays, buffer, pyramid)
+    marched = through(rays, buffer)
     hit = marched.status == hrt.MarchStatus.HIT
     x, y = marched.pixel[hit].T
     np.testing.assert_array_equal(marched.prim_id[hit], buffer.prim_id[y, x])

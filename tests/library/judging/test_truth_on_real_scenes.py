@@ -29,7 +29,7 @@ def rays(scene):
 
 
 def test_every_disagreement_with_robust_embree_is_explained(scene, truth, rays):
-    path = "packet" if hrt.packet_available() is None else "run"
+    path = "packet" if hrt.embree_problem() is None else "run"
     embree = hrt.EmbreeTracer(scene, path=path).intersect(rays)
     n = len(rays)
     assert n > 100_000

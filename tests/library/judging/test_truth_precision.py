@@ -65,7 +65,7 @@ def test_rays_that_embree_lets_through_are_its_errors(robust):
     target = targets(scene, "vertex", n, rng)
     origin = rng.uniform(-0.3, 0.3, (n, 3)).astype(np.float32)
     rays = hrt.Rays.from_arrays(origin, target - origin)
-    path = "packet" if hrt.packet_available() is None else "run"
+    path = "packet" if hrt.embree_problem() is None else "run"
     embree = hrt.EmbreeTracer(scene, robust=robust, path=path).intersect(rays)
     camera, every = hrt.Camera.look_at((0, 0, 0), (0, 0, -1)), np.ones(n, bool)
     leaks = embree.prim_id < 0
