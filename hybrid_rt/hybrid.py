@@ -132,12 +132,12 @@ def trace_hybrid(
         if into is None:
             found = tracer.intersect(traced.take(indices))
             _check.instance("what the tracer returns", found, Hits)
-            hits.put(indices, found.checked("what the tracer returns", len(indices), faces))
+            hits.put(indices, found._checked("what the tracer returns", len(indices), faces))
         else:
             into(traced, hits, indices)
             if not _ours(tracer):
                 rows: list[Any] = [array[indices] for array in hits.arrays]
-                Hits(*rows).checked("what the tracer writes", len(indices), faces)
+                Hits(*rows)._checked("what the tracer writes", len(indices), faces)
         return hits
 
     def merge(marched: Marched, hits: Hits, workers: int) -> None:

@@ -30,7 +30,7 @@ class Rate:
     @classmethod
     def of(cls, count: int, total: int) -> Rate:
         """Return the rate of `count` in `total`."""
-        total = _check.integer("total", total, least=0)
+        total = _check.integer("total", total, least=0, most=2**63 - 1)
         count = _check.integer("count", count, least=0, most=total)
         if total == 0:
             return cls(0, 0, 0.0, 1.0)

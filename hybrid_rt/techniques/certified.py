@@ -148,6 +148,7 @@ class Certified(Technique):
         ArgumentError
             With the guard band it would have more pixels along a side than a camera may.
         """
+        _check.instance("camera", camera, Camera)
         longest = max(camera.width, camera.height) * self.guard
         if longest > LARGEST_SIDE:
             most = LARGEST_SIDE / max(camera.width, camera.height)
