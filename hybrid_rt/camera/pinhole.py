@@ -58,7 +58,7 @@ class Camera:
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
-        if max(map(abs, self.eye)) > np.finfo(np.float32).max:
+        if max(map(abs, self.eye)) > float(np.finfo(np.float32).max):
             expected = "coordinates within float32, as vertices have them"
             raise ArgumentError("eye", expected, _check.describe(self.eye))
         axes = np.array([self.right, self.up, self.forward])
