@@ -353,7 +353,7 @@ def test_interval_of_a_count_that_cannot_be_is_refused():
         hrt.Rate.of(3, 2)
 
 
-def test_rates_and_statuses_count_what_was_judged():
+def test_rates_count_what_was_judged():
     verdict = np.array([0, 0, 1, 1, 1, 2, 3, 4, 5, 6], np.uint8)
     error_px = np.array([np.nan, np.nan, 0.2, 5.0, np.nan, 0, np.inf, np.nan, 0.9, 0])
     judged = hrt.Judged(verdict, np.full(10, np.nan), error_px, verdict == 6, 1.0)
@@ -366,16 +366,3 @@ def test_rates_and_statuses_count_what_was_judged():
         "wrong_primitive": 1, "reference_wrong": 1, "pixel_error": 2,
     }  # fmt: skip
     assert {rate.total for name, rate in rates.items() if name != "alpha"} == {8}
-    assert hrt.alpha(verdict != 0) == rates["alpha"]
-
-    status = np.array([2, 3, 0, 0, 1, 0, 0, 1, 0, 0], np.uint8)
-    table = hrt.by_status(status, judged)
-    assert list(table) == [s.name for s in hrt.MarchStatus]
-    assert sum(row["rays"] for row in table.values()) == 10
-    assert sum(row["share"] for row in table.values()) == pytest.approx(1)
-    assert table["HIT"]["rays"] == 6
-    assert table["HIT"]["false_hit"] == 1
-    assert table["HIT"]["pixel_error"] == 2
-    assert table["MISS"]["false_miss"] == 1
-    assert table["HIDDEN"]["unresolved"] == 1
-    assert table["NEAR"]["rays"] == 0

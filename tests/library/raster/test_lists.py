@@ -7,6 +7,7 @@ import pytest
 
 import hybrid_rt as hrt
 from naive import lists as naive
+from support.screens import lists_of
 from support.soup import random_scene
 
 
@@ -77,17 +78,17 @@ def test_the_first_bound_is_never_behind_the_visible_surface():
     rng = np.random.default_rng(6)
     scene = random_scene(rng, 60)
     camera = hrt.Camera.look_at((0, 0, 5), (0, 0, 0), width=64, height=48, near=0.1)
-    gbuffer = hrt.rasterize(scene, camera, lists=2)
-    assert (gbuffer.lists.nearest[:, :, 0] >= gbuffer.depth).all()
+    gbuffer = hrt.rasterize(scene, camera)
+    assert (lists_of(scene, camera, 2).nearest[:, :, 0] >= gbuffer.depth).all()
 
 
 def test_a_triangle_that_misses_every_centre_is_listed():
     camera = hrt.Camera.look_at((0, 0, 0), (0, 0, -1), vfov_deg=90, width=8, height=8, near=0.1)
     # x_px = 4 + 4 x / z: a speck inside of pixel (5, 4), beside its centre.
     corners = np.array([(1.1, -0.6, -4), (1.12, -0.6, -4), (1.1, -0.62, -4)])
-    gbuffer = hrt.rasterize(hrt.Scene.from_arrays(corners, [[0, 1, 2]]), camera, lists=1)
-    assert (gbuffer.prim_id == -1).all()
-    assert np.argwhere(gbuffer.lists.prim_id[:, :, 0] == 0).tolist() == [[4, 5]]
+    scene = hrt.Scene.from_arrays(corners, [[0, 1, 2]])
+    assert (hrt.rasterize(scene, camera).prim_id == -1).all()
+    assert np.argwhere(lists_of(scene, camera, 1).prim_id[:, :, 0] == 0).tolist() == [[4, 5]]
 
 
 def test_a_triangle_across_the_near_plane_is_listed_as_near_as_it_comes():
@@ -191,11 +192,3 @@ def test_a_triangle_with_two_equal_corners_is_nothing():
     for faces in ([0, 1, 2], [0, 1, 1], [1, 1, 1]):
         found = lists_of(hrt.Scene.from_arrays(corners, [faces]), camera, 1)
         assert (found.prim_id == -1).all()
-
-
-@pytest.mark.parametrize("lists", [-1, 65, 2.5, "8"])
-def test_bad_length(lists):
-    scene = hrt.Scene.from_arrays(np.eye(3), [[0, 1, 2]])
-    camera = hrt.Camera.look_at((0, 0, 5), (0, 0, 0), width=4, height=4)
-    with pytest.raises(hrt.ArgumentError, match="lists"):
-        hrt.rasterize(scene, camera, lists=lists)

@@ -15,6 +15,7 @@ from hybrid_rt.kernels.raster.lists_planes import (
 )
 from hybrid_rt.kernels.techniques.certified import scalar as kernels
 from naive import lists as naive
+from support.screens import lists_of
 from support.soup import random_scene
 
 F = np.float32

@@ -17,13 +17,13 @@ def case(seed, n=200):
     rng = np.random.default_rng(seed)
     width, height = (int(x) for x in rng.integers(1, 70, 2))
     buffer = synthetic.random_gbuffer(rng, width, height)
-    return rng, buffer, hrt.build_depth_pyramid(buffer), synthetic.random_rays(rng, buffer, n)
+    return rng, buffer, synthetic.random_rays(rng, buffer, n)
 
 
 @settings(max_examples=30, deadline=None)
 @given(seeds)
 def test_permuting_rays_permutes_results(seed):
-    rng, buffer, pyramid, rays = case(seed)
+    rng, buffer, rays = case(seed)
     order = rng.permutation(len(rays))
     straight = through(rays, buffer)
     permuted = through(rays.take(order), buffer)
@@ -34,7 +34,7 @@ def test_permuting_rays_permutes_results(seed):
 @settings(max_examples=15, deadline=None)
 @given(seeds, st.integers(1, 8))
 def test_the_number_of_threads_changes_nothing(seed, samples):
-    _, buffer, pyramid, rays = case(seed, n=3000)
+    _, buffer, rays = case(seed, n=3000)
     one = through(rays, buffer, hrt.Paper(samples), threads=1)
     all_ = through(rays, buffer, hrt.Paper(samples), threads=_threads.available())
     for name in (*FIELDS, "steps_by_level"):
@@ -44,7 +44,7 @@ def test_the_number_of_threads_changes_nothing(seed, samples):
 @settings(max_examples=30, deadline=None)
 @given(seeds)
 def test_answers_hold_together(seed):
-    _, buffer, pyramid, rays = case(seed)
+    _, buffer, rays = case(seed)
     marched = through(rays, buffer)
     hit = marched.status == hrt.MarchStatus.HIT
     x, y = marched.pixel[hit].T

@@ -133,7 +133,6 @@ def test_hiz_does_not_trust_what_lies_at_the_border():
     start = hrt.unproject(buffer.camera, [[20.5, 20.5, NEAR / 2], [2.5, 20.5, NEAR / 2]])
     end = hrt.unproject(buffer.camera, [[22.5, 20.5, NEAR / 6], [1.5, 20.5, NEAR / 6]])
     rays = hrt.Rays.from_arrays(start, end - start)
-    pyramid = hrt.build_depth_pyramid(buffer)
     for border, hits in ((0.0, [True, True]), (0.1, [True, False]), (1.0, [False, False])):
         marched = through(rays, buffer, hrt.HiZ(1.0, border=border))
         assert marched.resolved.tolist() == hits
@@ -206,7 +205,6 @@ def test_slope_frees_rays_that_leave_a_floor():
     start = np.concatenate([pixel + 0.5, buffer.depth.reshape(-1, 1)], axis=1)
     origin = hrt.unproject(buffer.camera, start)
     rays = hrt.Rays.from_arrays(origin, np.tile([0.0, 0.75, -1.0], (len(origin), 1)), pixel)
-    pyramid = hrt.build_depth_pyramid(buffer)
     hidden = [(through(rays, buffer, mode).status == S.HIDDEN).sum() for mode in ("paper", "slope")]
     assert hidden[0] > 100
     assert hidden[1] == 0
@@ -222,16 +220,6 @@ def test_slope_answers_with_the_tilted_plane():
     # 0.05 - 0.0008 (y - 5.5) = 0.01 + 0.002 y
     np.testing.assert_allclose(at[1], (0.05 + 0.0008 * 5.5 - 0.01) / 0.0028, rtol=1e-5)
     assert tuple(marched.pixel[0]) == (16, int(at[1]))
-
-
-def test_slope_takes_either_pyramid():
-    rng = np.random.default_rng(5)
-    buffer = synthetic.random_gbuffer(rng, 33, 21)
-    rays = synthetic.random_rays(rng, buffer, 300)
-    one = through(rays, buffer, "slope")
-    two = through(rays, buffer, "slope")
-    for name in ("status", "pixel", "t", "t_free", "steps", "steps_by_level"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
 
 
 def test_slope_reads_fewer_cells_with_coarser_ones():
@@ -300,18 +288,3 @@ def test_nothing_to_march(mode):
 def test_bad_parameters(mode, parameters, argument):
     with pytest.raises(hrt.ArgumentError, match=f"^{argument}: expected"):
         mode(**parameters)
-
-
-@pytest.mark.parametrize("mode", ["paper", "linear", "dda", "hiz"])
-def test_a_slope_pyramid_is_for_mode_slope(mode):
-    buffer = wall_in_a_row(2.0)
-    rays = hrt.Rays.from_arrays(np.zeros((1, 3)), np.ones((1, 3)))
-    with pytest.raises(hrt.ArgumentError, match="pyramid: expected a DepthPyramid"):
-        through(rays, buffer, mode)
-
-
-def test_the_slope_pyramid_of_another_view_is_refused():
-    rays = hrt.Rays.from_arrays(np.zeros((1, 3)), np.ones((1, 3)))
-    other = hrt.build_slope_pyramid(tilted_floor())
-    with pytest.raises(hrt.ArgumentError, match="65 by 1 pixels at level 0, got one of 32 by 48"):
-        through(rays, wall_in_a_row(2.0), "slope")

@@ -30,7 +30,6 @@ def counted():
     truth = hrt.EmbreeTracer(scene).intersect(rays)
     at = rays.origin + np.where(np.isfinite(truth.t), truth.t, 0)[:, None] * rays.direction
     true_pixel = hrt.project(buffer.camera, at)[:, :2] - 0.5
-    pyramid = hrt.build_depth_pyramid(buffer)
     counts = {}
     print()
     for name in BOUNDS:

@@ -48,13 +48,13 @@ def case(seed, n=200):
     rng = np.random.default_rng(seed)
     width, height = (int(x) for x in rng.integers(1, 70, 2))
     buffer = synthetic.random_gbuffer(rng, width, height)
-    return rng, buffer, hrt.build_depth_pyramid(buffer), synthetic.random_rays(rng, buffer, n)
+    return rng, buffer, synthetic.random_rays(rng, buffer, n)
 
 
 @settings(max_examples=40, deadline=None)
 @given(seeds, modes)
 def test_permuting_rays_permutes_results(seed, mode):
-    rng, buffer, pyramid, rays = case(seed)
+    rng, buffer, rays = case(seed)
     order = rng.permutation(len(rays))
     straight = through(rays, buffer, mode)
     permuted = through(rays.take(order), buffer, mode)
@@ -65,7 +65,7 @@ def test_permuting_rays_permutes_results(seed, mode):
 @settings(max_examples=25, deadline=None)
 @given(seeds, modes)
 def test_the_number_of_threads_changes_nothing(seed, mode):
-    _, buffer, pyramid, rays = case(seed, n=3000)
+    _, buffer, rays = case(seed, n=3000)
     one = through(rays, buffer, mode, threads=1)
     all_ = through(rays, buffer, mode, threads=_threads.available())
     for name in (*FIELDS, "steps_by_level"):
@@ -75,7 +75,7 @@ def test_the_number_of_threads_changes_nothing(seed, mode):
 @settings(max_examples=80, deadline=None)
 @given(seeds, modes)
 def test_answers_hold_together(seed, mode):
-    _, buffer, pyramid, rays = case(seed)
+    _, buffer, rays = case(seed)
     marched = through(rays, buffer, mode)
     hit = marched.prim_id >= 0
     miss = marched.resolved & ~hit
@@ -113,7 +113,7 @@ def test_answers_hold_together(seed, mode):
 @settings(max_examples=25, deadline=None)
 @given(seeds)
 def test_switches_of_hiz_touch_only_their_own_rays(seed):
-    _, buffer, pyramid, rays = case(seed)
+    _, buffer, rays = case(seed)
     settings_ = {"thickness": 0.5, "max_steps": 6}
     strict = hrt.HiZ(exhausted_hits=False, trace_background=True, **settings_)
     base = through(rays, buffer, strict)
@@ -131,7 +131,7 @@ def test_switches_of_hiz_touch_only_their_own_rays(seed):
 @settings(max_examples=25, deadline=None)
 @given(seeds)
 def test_a_thicker_slab_never_loses_a_dda_hit(seed):
-    _, buffer, pyramid, rays = case(seed)
+    _, buffer, rays = case(seed)
     hits = [through(rays, buffer, hrt.PixelDDA(t)).resolved for t in (0.01, 0.1, 1.0, 10.0)]
     for thin, thick in itertools.pairwise(hits):
         assert thick[thin].all()
