@@ -124,6 +124,7 @@ print(len(kernels.intersect.signatures), sum(kernels.intersect.stats.cache_hits.
 """
 
 
+@pytest.mark.slow
 @needs_packets
 def test_machine_code_is_compiled_once_and_serves_the_next_process(tmp_path):
     """Function addresses are arguments; as globals they would be of the first process."""
