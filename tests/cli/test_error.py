@@ -6,7 +6,8 @@ import sys
 import pandas as pd
 import pytest
 
-from hybrid_rt_bench import cli, error_cell
+from hybrid_rt_bench import cli
+from hybrid_rt_bench.judged import cell as error_cell
 
 TINY = """
 schema = 1

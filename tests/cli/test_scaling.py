@@ -10,8 +10,9 @@ import pandas as pd
 import psutil
 import pytest
 
-from hybrid_rt_bench import cli, scaling_run
-from hybrid_rt_bench.scaling_worker import Worker, WorkerError
+from hybrid_rt_bench import cli
+from hybrid_rt_bench.kinds.scaling import run as scaling_run
+from hybrid_rt_bench.executors.processes import Worker, WorkerError
 
 TINY = """
 schema = 1

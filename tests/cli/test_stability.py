@@ -8,8 +8,9 @@ import pandas as pd
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt_bench import cli, stability
-from hybrid_rt_bench.techniques import TECHNIQUES
+from hybrid_rt_bench import cli
+from hybrid_rt_bench.kinds.stability import run as stability
+from hybrid_rt_bench.measure.techniques import TECHNIQUES
 
 CASES = "screen_axes,parallel_to_image,zero_area"
 

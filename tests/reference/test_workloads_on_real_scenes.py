@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt_bench.workloads import WORKLOADS
+from hybrid_rt_bench.measure.workloads import WORKLOADS
 from hybrid_rt_scenes import get_scene, scene_names
 
 CLOSED = {"kitchen", "conference"}  # no sun comes in

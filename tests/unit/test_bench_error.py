@@ -4,16 +4,25 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt_bench import error_cell, image_error, shade
-from hybrid_rt_bench.error_run import plan_cells
-from hybrid_rt_bench.error_spec import ErrorExperiment
-from hybrid_rt_bench.measure import prepare
-from hybrid_rt_bench.points import CHEAPEST, LISTS, SWITCHES, ListsForm, View, points_of
-from hybrid_rt_bench.pooling import VERDICTS
-from hybrid_rt_bench.queries import AnyHit, NearestHit
-from hybrid_rt_bench.spec import Resolution, load_experiment, parse_experiment
-from hybrid_rt_bench.techniques import TECHNIQUES, get_technique
-from hybrid_rt_bench.workloads import get_workload
+from hybrid_rt_bench.judged import cell as error_cell
+from hybrid_rt_bench.judged import image_error
+from hybrid_rt_bench.measure import shade
+from hybrid_rt_bench.judged.run import plan_cells
+from hybrid_rt_bench.judged.spec import ErrorExperiment
+from hybrid_rt_bench.measure.loaded import prepare
+from hybrid_rt_bench.measure.points import (
+    CHEAPEST,
+    LISTS,
+    SWITCHES,
+    ListsForm,
+    View,
+    points_of,
+)
+from hybrid_rt_bench.judged.columns import VERDICTS
+from hybrid_rt_bench.measure.queries import AnyHit, NearestHit
+from hybrid_rt_bench.experiments import Resolution, load_experiment, parse_experiment
+from hybrid_rt_bench.measure.techniques import TECHNIQUES, get_technique
+from hybrid_rt_bench.measure.workloads import get_workload
 from hybrid_rt_scenes import get_scene
 
 TEXT = """

@@ -8,11 +8,16 @@ import pytest
 from matplotlib.figure import Figure
 
 import hybrid_rt as hrt
-from hybrid_rt_bench import compare, results
-from hybrid_rt_bench.error_cell import PREPARED, _timing_columns
-from hybrid_rt_bench.pooling import CELL, VERDICTS
-from hybrid_rt_bench.report import error_maps, error_tables, pareto, render_run
-from hybrid_rt_bench.results import MAP_CLASSES
+from hybrid_rt_bench.kinds.paper import compare
+from hybrid_rt_bench.results import folder as results
+from hybrid_rt_bench.judged.columns import PREPARED
+from hybrid_rt_bench.judged.cell import _timing_columns
+from hybrid_rt_bench.judged.columns import CELL, VERDICTS
+from hybrid_rt_bench.report import render_run
+from hybrid_rt_bench.judged import maps as error_maps
+from hybrid_rt_bench.judged import tables as error_tables
+from hybrid_rt_bench.judged import figures as pareto
+from hybrid_rt_bench.judged.columns import MAP_CLASSES
 
 RAYS, ROUNDS = 10_000, 3
 # technique, point, default, answers, false hits, false misses, seconds of the hybrid

@@ -4,10 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hybrid_rt_bench import results
-from hybrid_rt_bench.error_cell import _timing_columns
-from hybrid_rt_bench.pooling import CELL, VERDICTS
-from hybrid_rt_bench.report import ablation, error_tables, goal, render_run
+from hybrid_rt_bench.results import folder as results
+from hybrid_rt_bench.judged.cell import _timing_columns
+from hybrid_rt_bench.judged.columns import CELL, VERDICTS
+from hybrid_rt_bench.report import render_run
+from hybrid_rt_bench.kinds.ablation import tables as ablation
+from hybrid_rt_bench.judged import tables as error_tables
+from hybrid_rt_bench.kinds.hybrid import tables as goal
 
 ROUNDS = 3
 EMBREE = 1.0

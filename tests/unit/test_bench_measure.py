@@ -2,8 +2,12 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt_bench import env, plan, primary, shade, strongest
-from hybrid_rt_bench.spec import load_experiment
+from hybrid_rt_bench.measure import environment as env
+from hybrid_rt_bench.measure import plan
+from hybrid_rt_bench.measure import primary
+from hybrid_rt_bench.measure import shade
+from hybrid_rt_bench.measure import strongest
+from hybrid_rt_bench.experiments import load_experiment
 
 PAPER = load_experiment("paper")
 

@@ -12,14 +12,27 @@ import pandas as pd
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt_bench import agreement, cli, peers, peers_cell, peers_run, results
-from hybrid_rt_bench.peers import trial
-from hybrid_rt_bench.peers.base import Answers, Opened, Peer, PeerError, Picture, Query, View
-from hybrid_rt_bench.peers.ours import Embree
-from hybrid_rt_bench.peers_cell import Contender
-from hybrid_rt_bench.report import peers as peers_report
+from hybrid_rt_bench import cli
+from hybrid_rt_bench.kinds.peers import agreement
+from hybrid_rt_bench.kinds.peers import programs as peers
+from hybrid_rt_bench.kinds.peers import cell as peers_cell
+from hybrid_rt_bench.kinds.peers import run as peers_run
+from hybrid_rt_bench.results import folder as results
+from hybrid_rt_bench.kinds.peers import trial
+from hybrid_rt_bench.kinds.peers.programs.base import (
+    Answers,
+    Opened,
+    Peer,
+    PeerError,
+    Picture,
+    Query,
+    View,
+)
+from hybrid_rt_bench.kinds.peers.programs.ours import Embree
+from hybrid_rt_bench.kinds.peers.cell import Contender
+from hybrid_rt_bench.kinds.peers import tables as peers_report
 from hybrid_rt_bench.report import render_run
-from hybrid_rt_bench.spec import load_experiment, parse_experiment
+from hybrid_rt_bench.experiments import load_experiment, parse_experiment
 from hybrid_rt_scenes import get_scene
 
 TEXT = """

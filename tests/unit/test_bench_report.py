@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt_bench import compare, results, stats, summary
+from hybrid_rt_bench.kinds.paper import compare
+from hybrid_rt_bench.results import folder as results
+from hybrid_rt_bench.results import statistics as stats
+from hybrid_rt_bench.kinds.paper import summary
 from hybrid_rt_bench.report import all_tables, render_run
 from hybrid_rt_bench.report.table import Table, number
-from hybrid_rt_bench.spec import load_experiment
+from hybrid_rt_bench.experiments import load_experiment
 
 ALPHA, ROUNDS = 0.4, 5
 MILLISECONDS = {

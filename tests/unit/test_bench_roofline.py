@@ -11,12 +11,17 @@ import pytest
 import hybrid_rt as hrt
 from hybrid_rt.kernels.simd import WIDTH
 from hybrid_rt.kernels.techniques.certified import lanes
-from hybrid_rt_bench import cli, rates, results, roofline, roofline_cell, roofline_run
-from hybrid_rt_bench import rates_kernels as kernels
-from hybrid_rt_bench.measure import prepare
+from hybrid_rt_bench import cli
+from hybrid_rt_bench.kinds.roofline import rates
+from hybrid_rt_bench.results import folder as results
+from hybrid_rt_bench.kinds.roofline import reckon as roofline
+from hybrid_rt_bench.kinds.roofline import cell as roofline_cell
+from hybrid_rt_bench.kinds.roofline import run as roofline_run
+from hybrid_rt_bench.kinds.roofline import kernels
+from hybrid_rt_bench.measure.loaded import prepare
 from hybrid_rt_bench.report import render_run
-from hybrid_rt_bench.report import roofline as report
-from hybrid_rt_bench.spec import load_experiment, parse_experiment
+from hybrid_rt_bench.kinds.roofline import tables as report
+from hybrid_rt_bench.experiments import load_experiment, parse_experiment
 from hybrid_rt_scenes import get_scene
 
 TEXT = """

@@ -12,14 +12,31 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import hybrid_rt as hrt
-from hybrid_rt_bench import compare, exponents, memory, results, scaling_stages, strongest
-from hybrid_rt_bench.plan import NothingToRunError
-from hybrid_rt_bench.report import render_run, scaling, scaling_figures
-from hybrid_rt_bench.scaling_cell import Cell, Stages, Task, Visit
-from hybrid_rt_bench.scaling_run import Measured, PlannedCell, _thread_counts, plan_series
-from hybrid_rt_bench.scaling_worker import Worker, WorkerError
-from hybrid_rt_bench.spec import Resolution, load_experiment, parse_experiment
-from hybrid_rt_bench.spec_scaling import Series, parse_counts
+from hybrid_rt_bench.kinds.paper import compare
+from hybrid_rt_bench.results import exponents
+from hybrid_rt_bench.measure import memory
+from hybrid_rt_bench.results import folder as results
+from hybrid_rt_bench.kinds.scaling import stages as scaling_stages
+from hybrid_rt_bench.measure import strongest
+from hybrid_rt_bench.measure.errors import NothingToRunError
+from hybrid_rt_bench.report import render_run
+from hybrid_rt_bench.kinds.scaling import tables as scaling
+from hybrid_rt_bench.kinds.scaling import figures as scaling_figures
+from hybrid_rt_bench.kinds.scaling.cell import (
+    Cell,
+    Stages,
+    Task,
+    Visit,
+)
+from hybrid_rt_bench.kinds.scaling.run import (
+    Measured,
+    PlannedCell,
+    _thread_counts,
+    plan_series,
+)
+from hybrid_rt_bench.executors.processes import Worker, WorkerError
+from hybrid_rt_bench.experiments import Resolution, load_experiment, parse_experiment
+from hybrid_rt_bench.kinds.scaling.spec import Series, parse_counts
 
 GOOD = """
 schema = 1

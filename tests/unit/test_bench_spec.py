@@ -3,14 +3,14 @@ import pytest
 import hybrid_rt as hrt
 from hybrid_rt_bench.kinds import RUNNERS
 from hybrid_rt_bench.report.render import FORMS
-from hybrid_rt_bench.spec import (
+from hybrid_rt_bench.experiments import (
     KINDS,
     Resolution,
     experiment_names,
     load_experiment,
     parse_experiment,
 )
-from hybrid_rt_bench.techniques import get_technique
+from hybrid_rt_bench.measure.techniques import get_technique
 
 GOOD = """
 schema = 1

@@ -8,7 +8,7 @@ import pytest
 import hybrid_rt as hrt
 import synthetic
 from hybrid_rt.techniques import modes
-from hybrid_rt_bench.techniques import TECHNIQUES, get_technique
+from hybrid_rt_bench.measure.techniques import TECHNIQUES, get_technique
 
 
 def box(size):
