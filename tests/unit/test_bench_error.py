@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
+from hybrid_rt_bench.experiments import load_experiment, parse_experiment
 from hybrid_rt_bench.judged import cell as error_cell
 from hybrid_rt_bench.judged import image_error
-from hybrid_rt_bench.measure import shade
+from hybrid_rt_bench.judged.columns import VERDICTS
 from hybrid_rt_bench.judged.run import plan_cells
-from hybrid_rt_bench.judged.spec import ErrorExperiment
+from hybrid_rt_bench.kinds.error.spec import ErrorExperiment
+from hybrid_rt_bench.measure import shade
+from hybrid_rt_bench.measure.experiment import Resolution
 from hybrid_rt_bench.measure.loaded import prepare
 from hybrid_rt_bench.measure.points import (
     CHEAPEST,
@@ -18,9 +21,7 @@ from hybrid_rt_bench.measure.points import (
     View,
     points_of,
 )
-from hybrid_rt_bench.judged.columns import VERDICTS
 from hybrid_rt_bench.measure.queries import AnyHit, NearestHit
-from hybrid_rt_bench.experiments import Resolution, load_experiment, parse_experiment
 from hybrid_rt_bench.measure.techniques import TECHNIQUES, get_technique
 from hybrid_rt_bench.measure.workloads import get_workload
 from hybrid_rt_scenes import get_scene

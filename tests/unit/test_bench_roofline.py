@@ -9,19 +9,20 @@ import pandas as pd
 import pytest
 
 import hybrid_rt as hrt
+from bench_rows import ENVIRONMENT
 from hybrid_rt.kernels.simd import WIDTH
 from hybrid_rt.kernels.techniques.certified import lanes
 from hybrid_rt_bench import cli
-from hybrid_rt_bench.kinds.roofline import rates
-from hybrid_rt_bench.results import folder as results
-from hybrid_rt_bench.kinds.roofline import reckon as roofline
-from hybrid_rt_bench.kinds.roofline import cell as roofline_cell
-from hybrid_rt_bench.kinds.roofline import run as roofline_run
-from hybrid_rt_bench.kinds.roofline import kernels
-from hybrid_rt_bench.measure.loaded import prepare
-from hybrid_rt_bench.report import render_run
-from hybrid_rt_bench.kinds.roofline import tables as report
+from hybrid_rt_bench.cli import terminal
 from hybrid_rt_bench.experiments import load_experiment, parse_experiment
+from hybrid_rt_bench.kinds.roofline import cell as roofline_cell
+from hybrid_rt_bench.kinds.roofline import kernels, rates
+from hybrid_rt_bench.kinds.roofline import reckon as roofline
+from hybrid_rt_bench.kinds.roofline import tables as report
+from hybrid_rt_bench.kinds.roofline.columns import SCHEMA
+from hybrid_rt_bench.measure.loaded import prepare
+from hybrid_rt_bench.results import folder as results
+from hybrid_rt_bench.runs import read_run, render_run
 from hybrid_rt_scenes import get_scene
 
 TEXT = """
@@ -247,12 +248,14 @@ def test_a_run_is_kept_and_shown_again(monkeypatch, tmp_path, capsys):
     assert list(found.threads) == [1]
     meta = json.loads((folder / "run.json").read_text())
     assert {row["bytes"] for row in meta["rates"]} == {16384, 65536}
-    assert set(meta["compile_seconds"]) == {"march", "rates"}
+    assert set(meta["compile_seconds"]) == {
+        "raster, march and Embree", "rates of the machine"
+    }  # fmt: skip
     text = (folder / "tables.md").read_text()
     for figure in ("gather-rate", "march-budget"):
         assert (folder / "figures" / f"{figure}.png").stat().st_size > 5000
     (folder / "tables.md").unlink()
-    render_run(results.load_run(folder))
+    render_run(read_run(folder))
     assert (folder / "tables.md").read_text() == text
 
 
@@ -264,9 +267,9 @@ def test_a_view_that_fails_costs_only_itself(monkeypatch, tmp_path, capsys):
             raise RuntimeError("out of luck")
         return real(base, camera, name, *others)
 
-    monkeypatch.setattr(roofline_run.roofline_cell, "measure_cell", fails)
+    monkeypatch.setattr(roofline_cell, "measure_cell", fails)
     code, folder = run(monkeypatch, tmp_path, "--threads", "1", "--quick")
-    assert code == cli.FAILED
+    assert code == terminal.FAILED
     assert "RuntimeError: out of luck" in capsys.readouterr().err
     (cell,) = json.loads((folder / "run.json").read_text())["cells"]
     assert cell["state"] == "failed"
@@ -278,7 +281,7 @@ def test_an_option_of_another_kind_is_refused(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(sys, "argv", ["hybrid-rt", "run", str(path), "--triangles", "64"])
     with pytest.raises(SystemExit) as stopped:
         cli.main()
-    assert stopped.value.code == cli.USAGE
+    assert stopped.value.code == terminal.USAGE
     assert "--triangles" in capsys.readouterr().err
 
 
@@ -287,6 +290,7 @@ def write_run(out, record):
     writer = results.create_run(
         out,
         "roofline",
+        SCHEMA,
         {
             "kind": "roofline", "command": [], "notes": [], "warnings": [], "rates": RATES,
             "spec": {"title": "Roofline", "rounds": 2, "repeats": 2},
@@ -294,10 +298,7 @@ def write_run(out, record):
             "caches": [{"name": "L1", "bytes": 32768}],
         },
     )  # fmt: skip
-    writer.meta["environment"] = {
-        "cpu": "a CPU", "threads": 2, "os": "an OS", "embree": {"version": "4"},
-        "packages": {"numba": "0"}, "git": None,
-    }  # fmt: skip
+    writer.meta["environment"] = ENVIRONMENT
     (row,) = record[2].results
     one = {"march_ns": 300.0, "start_ns": 40.0, "embree_ns": 250.0, "budget_ns": 100.0}
     two = {**one, "budget_ns": -5.0}
@@ -305,7 +306,7 @@ def write_run(out, record):
     rows = [{**row, "threads": 1, **one}, {**row, "threads": 2, **two}]
     writer.add_cell(cell, record[2].samples, rows, [])
     writer.finish()
-    return results.load_run(writer.folder)
+    return read_run(writer.folder)
 
 
 def test_the_report_is_made_of_the_files_alone(tmp_path, record):

@@ -12,31 +12,32 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import hybrid_rt as hrt
-from hybrid_rt_bench.kinds.paper import compare
-from hybrid_rt_bench.results import exponents
-from hybrid_rt_bench.measure import memory
-from hybrid_rt_bench.results import folder as results
-from hybrid_rt_bench.kinds.scaling import stages as scaling_stages
-from hybrid_rt_bench.measure import strongest
-from hybrid_rt_bench.measure.errors import NothingToRunError
-from hybrid_rt_bench.report import render_run
-from hybrid_rt_bench.kinds.scaling import tables as scaling
+from bench_rows import ENVIRONMENT
+from hybrid_rt_bench.executors.processes import Worker, WorkerError
+from hybrid_rt_bench.experiments import load_experiment, parse_experiment
 from hybrid_rt_bench.kinds.scaling import figures as scaling_figures
+from hybrid_rt_bench.kinds.scaling import tables as scaling
 from hybrid_rt_bench.kinds.scaling.cell import (
     Cell,
     Stages,
     Task,
     Visit,
 )
+from hybrid_rt_bench.kinds.scaling.columns import SCHEMA
 from hybrid_rt_bench.kinds.scaling.run import (
     Measured,
     PlannedCell,
     _thread_counts,
     plan_series,
 )
-from hybrid_rt_bench.executors.processes import Worker, WorkerError
-from hybrid_rt_bench.experiments import Resolution, load_experiment, parse_experiment
 from hybrid_rt_bench.kinds.scaling.spec import Series, parse_counts
+from hybrid_rt_bench.measure import memory, strongest
+from hybrid_rt_bench.measure.errors import NothingToRunError
+from hybrid_rt_bench.measure.experiment import Resolution
+from hybrid_rt_bench.report.style import STYLE
+from hybrid_rt_bench.results import exponents
+from hybrid_rt_bench.results import folder as results
+from hybrid_rt_bench.runs import compare_runs, read_run, render_run
 
 GOOD = """
 schema = 1
@@ -289,7 +290,7 @@ def test_the_upper_half_has_three_sizes_at_least():
 
 def test_a_cell_times_every_stage_of_its_techniques():
     cell = Cell(dataclasses.replace(TINY, brute_rays=64, brute_seconds=60.0))
-    visit = cell.visit(0, 1)
+    visit = cell.answer(0, 1)
     shared = {
         "build", "raster", "raster_lists", "pyramid", "pyramid_conservative", "rays", "embree",
         "brute_force",
@@ -308,7 +309,7 @@ def test_a_cell_times_every_stage_of_its_techniques():
 
 def test_a_stage_that_no_technique_reads_is_not_run():
     cell = Cell(dataclasses.replace(TINY, techniques=("slope",), build=False))
-    stages = {row["stage"] for row in cell.visit(0, 0).rows if row["technique"] == ""}
+    stages = {row["stage"] for row in cell.answer(0, 0).rows if row["technique"] == ""}
     assert stages == {"raster", "pyramid", "pyramid_slope", "rays", "embree"}
 
 
@@ -336,7 +337,7 @@ def test_the_same_build_is_timed_whichever_path_is_the_strongest(monkeypatch, pa
 def test_brute_force_is_left_out_where_it_takes_too_long():
     cell = Cell(dataclasses.replace(TINY, brute_rays=1024, brute_seconds=1e-9))
     assert cell.details["brute_force_seconds"] > 1e-9
-    assert "brute_force" not in {row["stage"] for row in cell.visit(0, 0).rows}
+    assert "brute_force" not in {row["stage"] for row in cell.answer(0, 0).rows}
 
 
 def test_a_sample_of_rays_is_spread_over_all():
@@ -354,10 +355,10 @@ def test_a_sample_of_rays_is_spread_over_all():
 
 
 def test_a_process_answers_visits_and_counts_memory():
-    worker = Worker(TINY)
+    worker = Worker(Cell, TINY)
     try:
         details = worker.ready()
-        visits = [worker.visit(number, 0) for number in range(2)]
+        visits = [worker.ask(number, 0) for number in range(2)]
     finally:
         worker.stop()
     assert details["triangles"] > 0
@@ -369,7 +370,7 @@ def test_a_process_answers_visits_and_counts_memory():
 
 
 def test_a_task_that_cannot_be_done_says_why():
-    worker = Worker(dataclasses.replace(TINY, scene="street", camera="along", size=7))
+    worker = Worker(Cell, dataclasses.replace(TINY, scene="street", camera="along", size=7))
     try:
         with pytest.raises(WorkerError, match="size: expected"):
             worker.ready()
@@ -379,12 +380,12 @@ def test_a_task_that_cannot_be_done_says_why():
 
 @pytest.mark.skipif(os.name != "posix", reason="processes are ended by signals on POSIX only")
 def test_a_process_that_is_ended_says_how():
-    worker = Worker(TINY)
+    worker = Worker(Cell, TINY)
     try:
         worker.ready()
         os.kill(worker.process.pid, signal.SIGKILL)
         with pytest.raises(WorkerError, match="ended by SIGKILL, as the system does when memory"):
-            worker.visit(0, 0)
+            worker.ask(0, 0)
     finally:
         worker.stop()
 
@@ -423,18 +424,15 @@ def write_run(out, sizes=(2**14, 2**17, 2**20, 2**23), axis="triangles", slower=
     writer = results.create_run(
         out,
         "scaling",
+        SCHEMA,
         {
             "kind": "scaling",
             "spec": experiment.model_dump(mode="json", by_alias=True),
             "notes": [],
             "warnings": [],
         },
-        scaling_stages.CELL_KEYS,
     )
-    writer.meta["environment"] = {
-        "cpu": "a CPU", "threads": 2, "os": "an OS", "embree": {"version": "4"},
-        "packages": {"numba": "0"}, "git": None, "threading_layer": "omp",
-    }  # fmt: skip
+    writer.meta["environment"] = ENVIRONMENT
     series = {"name": "a", "axis": axis, "scene": "street", "resolutions": ["64x48"]}
     series["triangles"] = list(sizes) if axis == "triangles" else []
     for x in sizes:
@@ -458,9 +456,9 @@ def write_run(out, sizes=(2**14, 2**17, 2**20, 2**23), axis="triangles", slower=
                 for phase in ("warmup", "measured")
             ]  # fmt: skip
             measured.add(Visit(rows, {"certified": 0.5}, {"certified": 20.0}, 2**29 + number))
-            writer.renew_cell(*measured.record())
+            writer.add_cell(*measured.record(), [])
     writer.finish()
-    return results.load_run(writer.folder)
+    return read_run(writer.folder)
 
 
 def row_of(table, first):
@@ -572,7 +570,7 @@ def test_no_two_texts_of_a_figure_overlap(tmp_path, axis, sizes):
     run = write_run(tmp_path, sizes=sizes, axis=axis)
     if axis == "pixels":
         run.results["label"] = "3840x2160"  # as long as any
-    with mpl.rc_context(scaling_figures.STYLE):
+    with mpl.rc_context(STYLE):
         figures = [scaling_figures.time_over_axis(run, "a"), scaling_figures.memory(run)]
     for figure in figures:
         if figure is None:
@@ -611,7 +609,7 @@ def drawn_texts(figure):
 def test_runs_are_compared_cell_by_cell(tmp_path):
     a = write_run(tmp_path)
     b = write_run(tmp_path, sizes=(2**14, 2**20), slower=1.5)
-    (table,) = compare.compared(a, b)
+    (table,) = compare_runs(a, b)
     assert "2 cells in common" in table.title
     row = row_of(table, "march (certified)")
     assert row[0] == "2"
@@ -623,7 +621,7 @@ def test_runs_are_compared_cell_by_cell(tmp_path):
 def test_runs_without_a_common_cell_or_of_other_kinds_are_not_compared(tmp_path):
     a, b = write_run(tmp_path), write_run(tmp_path, sizes=(2**11,))
     with pytest.raises(hrt.ArgumentError, match="none in common"):
-        compare.compared(a, b)
+        compare_runs(a, b)
     paper = dataclasses.replace(b, meta={**b.meta, "kind": "paper"})
     with pytest.raises(hrt.ArgumentError, match="two of kind 'scaling'"):
-        compare.compared(a, paper)
+        compare_runs(a, paper)

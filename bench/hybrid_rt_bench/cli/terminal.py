@@ -102,7 +102,7 @@ def guarded() -> Iterator[None]:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="hybrid-rt")
     guards = Stream(sys.stdout), Stream(sys.stderr)
-    sys.stdout, sys.stderr = guards  # type: ignore[assignment]
+    sys.stdout, sys.stderr = guards
     signals.came = None
     before: dict[int, Any] = {}
     with contextlib.suppress(ValueError):  # not in the main thread
