@@ -16,10 +16,13 @@ def describe(value: Any) -> str:
     """Return a short description of a value for an error message."""
     if isinstance(value, np.ndarray):
         return f"an array of shape {value.shape} and dtype {value.dtype}"
-    text = repr(value)
-    if len(text) > 80:
-        text = text[:77] + "..."
-    return f"{text} ({type(value).__name__})"
+    try:
+        shown = repr(value)
+    except Exception:  # whatever somebody's own class does
+        shown = "an object"
+    if len(shown) > 80:
+        shown = shown[:77] + "..."
+    return f"{shown} ({type(value).__name__})"
 
 
 def _shape_text(shape: tuple[int | str, ...]) -> str:
@@ -52,7 +55,7 @@ def array(
     expected = f"an array of shape {_shape_text(shape)} and dtype {want}"
     try:
         arr = np.asarray(value)
-    except (ValueError, TypeError) as error:
+    except Exception as error:  # of lists that are ragged, of somebody's own __array__
         raise ArgumentError(argument, expected, describe(value)) from error
     kinds = {"f": "fiu", "i": "iu", "u": "iu", "b": "b"}[want.kind]
     if arr.dtype.kind not in kinds:
@@ -69,8 +72,25 @@ def array(
         low, high = int(arr.min()), int(arr.max())
         if low < info.min or high > info.max:
             raise ArgumentError(argument, f"integers that fit {want}", f"values {low} to {high}")
-    with np.errstate(over="ignore", invalid="ignore"):
-        return np.ascontiguousarray(arr, dtype=want)
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.ascontiguousarray(arr, dtype=want)
+    except MemoryError as error:
+        raise ArgumentError(argument, f"{expected} that memory can hold", describe(arr)) from error
+
+
+def owned(
+    argument: str, value: Any, shape: tuple[int | str, ...], dtype: type[np.generic]
+) -> NDArray[Any]:
+    """Return what `array` does, in memory that the caller has no hold of."""
+    arr = array(argument, value, shape, dtype)
+    if isinstance(value, np.ndarray) and np.may_share_memory(arr, value):
+        try:
+            return arr.copy()
+        except MemoryError as error:
+            expected = "an array that memory can hold"
+            raise ArgumentError(argument, expected, describe(arr)) from error
+    return arr
 
 
 def writable(argument: str, value: Any, shape: tuple[int, ...], dtype: type[np.generic]) -> None:
@@ -99,6 +119,23 @@ def same_length(argument: str, value: NDArray[Any], other: str, length: int) -> 
         raise ArgumentError(argument, f"{length} rows, as many as {other}", f"{len(value)} rows")
 
 
+def in_range(argument: str, value: NDArray[Any], low: int, high: int, what: str) -> None:
+    """Raise, naming the first bad place and how many there are, unless low <= value <= high.
+
+    `what` says in words where the range comes from.
+    """
+    if value.size == 0 or (int(value.min()) >= low and int(value.max()) <= high):
+        return
+    bad = np.argwhere((value < low) | (value > high))
+    first = tuple(int(k) for k in bad[0])
+    where = str(first[0]) if len(first) == 1 else str(first)
+    raise ArgumentError(
+        argument,
+        f"values from {low} to {high} ({what})",
+        f"{len(bad)} out of range, the first, at {where}, is {value[first]}",
+    )
+
+
 def finite_rows(argument: str, value: NDArray[Any], what: str) -> None:
     """Raise, naming the first bad row and how many there are, unless all of `value` is finite."""
     flat = value.reshape(len(value), -1)
@@ -117,8 +154,10 @@ def vector3(argument: str, value: Any) -> tuple[float, float, float]:
     """Return `value` as three finite floats."""
     expected = "three finite numbers"
     try:
-        arr = np.asarray(value, dtype=np.float64)
-    except (ValueError, TypeError) as error:
+        arr = np.asarray(value)
+        with np.errstate(over="ignore"):
+            arr = arr.astype(np.float64) if arr.dtype.kind in "fiu" else np.empty(0)
+    except Exception as error:  # of lists that are ragged, of somebody's own __array__
         raise ArgumentError(argument, expected, describe(value)) from error
     if arr.shape != (3,) or not np.isfinite(arr).all():
         raise ArgumentError(argument, expected, describe(value))
@@ -138,20 +177,34 @@ def real(
         expected += f" > {above:g}"
     if below < math.inf:
         expected += f" and < {below:g}" if above > -math.inf else f" < {below:g}"
-    if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise ArgumentError(argument, expected, describe(value))
-    x = float(value)
+    x = _float(argument, value, expected)
     if not (math.isfinite(x) and above < x < below):
         raise ArgumentError(argument, expected, describe(value))
     return x
 
 
+def float32_length(argument: str, value: Any) -> float:
+    """Return `value` as a float > 0 that float32 can hold without losing digits."""
+    x = real(argument, value, above=0.0)
+    limits = np.finfo(np.float32)
+    if not float(limits.tiny) <= x <= float(limits.max):
+        raise ArgumentError(argument, "a length within float32", describe(value))
+    return x
+
+
+def _float(argument: str, value: Any, expected: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise ArgumentError(argument, expected, describe(value))
+    try:
+        return float(value)
+    except OverflowError as error:
+        raise ArgumentError(argument, expected, describe(value)) from error
+
+
 def fraction(argument: str, value: Any) -> float:
     """Return `value` as a float from 0 to 1, both included."""
     expected = "a number from 0 to 1"
-    if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise ArgumentError(argument, expected, describe(value))
-    x = float(value)
+    x = _float(argument, value, expected)
     if not 0.0 <= x <= 1.0:
         raise ArgumentError(argument, expected, describe(value))
     return x
@@ -159,8 +212,15 @@ def fraction(argument: str, value: Any) -> float:
 
 def boolean(argument: str, value: Any) -> bool:
     """Return `value` if it is True or False."""
-    if not isinstance(value, bool):
+    if not isinstance(value, bool | np.bool_):
         raise ArgumentError(argument, "True or False", describe(value))
+    return bool(value)
+
+
+def text(argument: str, value: Any) -> str:
+    """Return `value` if it is a str."""
+    if not isinstance(value, str):
+        raise ArgumentError(argument, "a str", describe(value))
     return value
 
 
@@ -176,8 +236,8 @@ def integer(argument: str, value: Any, *, least: int, most: int | None = None) -
 
 
 def choice(argument: str, value: Any, choices: tuple[Any, ...]) -> Any:
-    """Return `value` if it is one of `choices`."""
-    if value not in choices:
+    """Return `value` if it is one of `choices`, and of their type."""
+    if not any(type(value) is type(c) and value == c for c in choices):
         listed = ", ".join(repr(c) for c in choices)
         raise ArgumentError(argument, f"one of {listed}", describe(value))
     return value

@@ -38,6 +38,10 @@ class EmbreeError(HybridRTError, RuntimeError):
     """Embree cannot be reached, or reported an error."""
 
 
+class PluginError(HybridRTError):
+    """Something that an installed distribution offers cannot be loaded."""
+
+
 class UnknownNameError(HybridRTError, KeyError):
     """A name that is not known, with the nearest known one as a suggestion.
 

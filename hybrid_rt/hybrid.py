@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Any, Protocol, TypeVar
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
 import numpy as np
 
-from hybrid_rt import _threads
-from hybrid_rt._arrays import F32, I32, U8, Bool
+from hybrid_rt import _check, _threads
+from hybrid_rt.base import ANY, NEAREST, Screen, Tracer, check_tracer
 from hybrid_rt.kernels import hybrid as kernels
-from hybrid_rt.raster.gbuffer import GBuffer
-from hybrid_rt.raster.slope_pyramid import Pyramid
+from hybrid_rt.kernels.arrays import F32, I32, U8, Bool
 from hybrid_rt.rays.hits import Hits
+from hybrid_rt.rays.marched import Marched
 from hybrid_rt.rays.rays import Rays
-from hybrid_rt.techniques import modes
-from hybrid_rt.techniques.march import march
-from hybrid_rt.techniques.marched import Marched
-from hybrid_rt.techniques.modes import Certified, Mode
 
 
 class _OfMarch:
@@ -83,35 +79,12 @@ class OcclusionResult(_OfMarch):
 
 Answers = TypeVar("Answers", Hits, Bool)
 
-
-class Tracer(Protocol):
-    """Whatever answers rays exactly.
-
-    If it has a method `intersect_into` like `EmbreeTracer.intersect_into`, that is called instead:
-    then no ray and no hit is copied.
-    """
-
-    def intersect(self, rays: Rays) -> Hits:
-        """Return the nearest hit of each ray."""
-        ...
-
-
-class OcclusionTracer(Protocol):
-    """Whatever says exactly which rays are free; `occluded_into` is called instead where it is."""
-
-    def occluded(self, rays: Rays) -> Bool:
-        """Return, as (N,) bool, whether each ray hits anything between its t_near and t_far."""
-        ...
+STAGES = ("march", "compaction", "fallback", "merge")
+"""What a hybrid does, in turn."""
 
 
 def trace_hybrid(
-    rays: Rays,
-    gbuffer: GBuffer,
-    pyramid: Pyramid,
-    tracer: Tracer,
-    mode: str | Mode = "paper",
-    *,
-    threads: int | None = None,
+    rays: Rays, screen: Screen, tracer: Tracer, *, threads: int | None = None
 ) -> HybridResult:
     """Return the hit of every ray, from the screen where it answers and from `tracer` elsewhere.
 
@@ -119,69 +92,68 @@ def trace_hybrid(
     ----------
     rays : Rays
         N rays, world.
-    gbuffer : GBuffer
-    pyramid : DepthPyramid or SlopePyramid
-        Of `gbuffer`; as in `march`.
+    screen : Screen
+        What a technique reads of a view, from `prepare`.
     tracer : Tracer
-        An `EmbreeTracer`, a `BruteForceTracer` or anything with their `intersect`, over the scene
-        of `gbuffer`.
-    mode, threads
-        As in `march`; the tracer keeps its own number of threads.
+        An `EmbreeTracer`, a `BruteForceTracer` or anything with a `scene` and their `intersect`,
+        over the scene of `screen`.
+    threads : int, optional
+        For all but the tracer, which keeps its own number. Default: as many as Numba is set to.
 
     Returns
     -------
     HybridResult
-        N hits of the same kind as a tracer's. Where the march answered with a hit, t is the mode's
-        (in modes "paper" and "slope" the distance to the pixel's tilted plane), and u, v are the
-        barycentrics of that point, brought to the plane of the pixel's primitive: a pixel is
-        answered and not a triangle, so they may lie outside [0, 1]. Mode "certified" answers with
-        the hit itself.
+        N hits of the same kind as a tracer's. Where the march answered with a hit, t is the
+        technique's (of "paper" and "slope" the distance to the pixel's tilted plane), and u, v are
+        the barycentrics of that point, brought to the plane of the pixel's primitive: a pixel is
+        answered and not a triangle, so they may lie outside [0, 1]. "certified" answers with the
+        hit itself.
+
+    Raises
+    ------
+    ArgumentError
+        Rays, screen and tracer that do not belong together; a tracer that gives other than one
+        whole answer to each ray.
 
     Notes
     -----
-    Unresolved rays are traced in their order, so that neighbours stay neighbours; in mode
-    "certified" from where the march has proven them free (`hybrid_rt.kernels.hybrid.hand_over`).
-    "compaction" makes a list of them, "fallback" writes their hits into their rows of the result,
-    and "merge" those of the others. `timings` holds wall-clock seconds, without JIT compilation
-    only from the second call on.
+    Unresolved rays are traced in their order, so that neighbours stay neighbours; with a technique
+    that hands over, from where the march has proven them free
+    (`hybrid_rt.kernels.hybrid.hand_over`). "compaction" makes a list of them, "fallback" writes
+    their hits into their rows of the result, and "merge" those of the others. `timings` holds
+    wall-clock seconds, without JIT compilation only from the second call on.
     """
+    _check.instance("screen", screen, Screen)
+    check_tracer(tracer, screen.scene, NEAREST, "intersect")
+    faces = len(screen.scene)
 
-    def first() -> Marched:
-        return march(rays, gbuffer, pyramid, mode, threads=threads)
-
-    def trace(indices: I32, t_near: F32 | None) -> Hits:
-        hits = Hits.unfilled(len(rays))
+    def trace(traced: Rays, indices: I32) -> Hits:
+        hits = Hits.unfilled(len(traced))
         into: Any = getattr(tracer, "intersect_into", None)
         if into is None:
-            hits.put(indices, tracer.intersect(_rest(rays, indices, t_near)))
+            found = tracer.intersect(traced.take(indices))
+            _check.instance("what the tracer returns", found, Hits)
+            hits.put(indices, found._checked("what the tracer returns", len(indices), faces))
         else:
-            into(rays, hits, indices, t_near)
+            into(traced, hits, indices)
+            if not _ours(tracer):
+                rows: list[Any] = [array[indices] for array in hits.arrays]
+                Hits(*rows)._checked("what the tracer writes", len(indices), faces)
         return hits
 
     def merge(marched: Marched, hits: Hits, workers: int) -> None:
+        vertices, triangles, _ = screen.scene.arrays
+        origin, direction = rays.arrays[:2]
         kernels.answer_hits(
-            workers,
-            marched.resolved,
-            rays.origin,
-            rays.direction,
-            marched.prim_id,
-            marched.t,
-            gbuffer.scene.vertices,
-            gbuffer.scene.faces,
-            *hits.arrays,
-        )
+            workers, marched.resolved, origin, direction, marched.prim_id, marched.t,
+            vertices, triangles, *hits.arrays,
+        )  # fmt: skip
 
-    return HybridResult(*_in_stages(rays, first, _reach(gbuffer, mode), trace, merge, threads))
+    return HybridResult(*_in_stages(rays, screen, False, trace, merge, threads))
 
 
 def occluded_hybrid(
-    rays: Rays,
-    gbuffer: GBuffer,
-    pyramid: Pyramid,
-    tracer: OcclusionTracer,
-    mode: str | Mode = "paper",
-    *,
-    threads: int | None = None,
+    rays: Rays, screen: Screen, tracer: Tracer, *, threads: int | None = None
 ) -> OcclusionResult:
     """Return whether each ray meets anything, from the screen where it says so, else from `tracer`.
 
@@ -189,14 +161,11 @@ def occluded_hybrid(
     ----------
     rays : Rays
         N rays, world; any hit with ``t_near <= t <= t_far`` occludes.
-    gbuffer : GBuffer
-    pyramid : DepthPyramid or SlopePyramid
-        Of `gbuffer`.
-    tracer : OcclusionTracer
-        An `EmbreeTracer`, a `BruteForceTracer` or anything with their `occluded`, over the scene of
-        `gbuffer`.
-    mode, threads
-        As in `march`, which is asked for any hit; the tracer keeps its own number of threads.
+    screen, threads
+        As in `trace_hybrid`; the march is asked for any hit.
+    tracer : Tracer
+        An `EmbreeTracer`, a `BruteForceTracer` or anything with a `scene` and their `occluded`,
+        over the scene of `screen`.
 
     Returns
     -------
@@ -204,42 +173,45 @@ def occluded_hybrid(
         N answers. A ray that the march resolves is occluded where it names a primitive and free
         where it resolves to a miss.
 
+    Raises
+    ------
+    ArgumentError
+        As by `trace_hybrid`.
+
     Notes
     -----
     As for `trace_hybrid`.
     """
+    _check.instance("screen", screen, Screen)
+    check_tracer(tracer, screen.scene, ANY, "occluded")
 
-    def first() -> Marched:
-        return march(rays, gbuffer, pyramid, mode, any_hit=True, threads=threads)
-
-    def trace(indices: I32, t_near: F32 | None) -> Bool:
-        occluded = np.empty(len(rays), np.bool_)
+    def trace(traced: Rays, indices: I32) -> Bool:
+        occluded = np.empty(len(traced), np.bool_)
         into: Any = getattr(tracer, "occluded_into", None)
         if into is None:
-            occluded[indices] = tracer.occluded(_rest(rays, indices, t_near))
+            found = tracer.occluded(traced.take(indices))
+            shape = (len(indices),)
+            occluded[indices] = _check.array("what the tracer returns", found, shape, np.bool_)
         else:
-            into(rays, occluded, indices, t_near)
+            into(traced, occluded, indices)
         return occluded
 
     def merge(marched: Marched, occluded: Bool, workers: int) -> None:
         kernels.answer_occlusion(marched.resolved, marched.prim_id, occluded)
 
-    return OcclusionResult(*_in_stages(rays, first, _reach(gbuffer, mode), trace, merge, threads))
+    return OcclusionResult(*_in_stages(rays, screen, True, trace, merge, threads))
 
 
-def _reach(gbuffer: GBuffer, mode: str | Mode) -> float | None:
-    """Return the scene's largest coordinate where rays are handed over, else None."""
-    chosen = modes.named(mode)
-    if isinstance(chosen, Certified) and chosen.hand_over:
-        return float(np.abs(gbuffer.scene.bounds).max())
-    return None
+def _ours(tracer: Tracer) -> bool:
+    """Is a tracer one of this library's, which are tested to answer as they should."""
+    return type(tracer).__module__.partition(".")[0] == __package__
 
 
 def _in_stages(
     rays: Rays,
-    first: Callable[[], Marched],
-    reach: float | None,
-    trace: Callable[[I32, F32 | None], Answers],
+    screen: Screen,
+    any_hit: bool,
+    trace: Callable[[Rays, I32], Answers],
     merge: Callable[[Marched, Answers, int], None],
     threads: int | None,
 ) -> tuple[Answers, Marched, dict[str, float]]:
@@ -248,18 +220,17 @@ def _in_stages(
     `trace` makes room for all answers and writes those of some rays, `merge` writes the others.
     """
     clock = [time.perf_counter()]
-    marched = first()
+    marched = screen.technique.march(rays, screen, any_hit=any_hit, threads=threads)
     clock.append(time.perf_counter())
     with _threads.limited(threads) as workers:
         indices = _unresolved(marched)
-        t_near = None if reach is None else _handed_over(rays, marched, reach)
+        traced = _handed_over(rays, marched, screen) if screen.technique.hands_over else rays
         clock.append(time.perf_counter())
-        answers = trace(indices, t_near)
+        answers = trace(traced, indices)
         clock.append(time.perf_counter())
         merge(marched, answers, workers)
         clock.append(time.perf_counter())
-    stages = ("march", "compaction", "fallback", "merge")
-    return answers, marched, {stage: clock[k + 1] - clock[k] for k, stage in enumerate(stages)}
+    return answers, marched, {stage: clock[k + 1] - clock[k] for k, stage in enumerate(STAGES)}
 
 
 def _unresolved(marched: Marched) -> I32:
@@ -271,22 +242,13 @@ def _unresolved(marched: Marched) -> I32:
     return indices
 
 
-def _handed_over(rays: Rays, marched: Marched, reach: float) -> F32:
-    """Return a t_near, (N,) float32, that is set only for unresolved rays."""
-    t_near = np.empty(len(rays), np.float32)
+def _handed_over(rays: Rays, marched: Marched, screen: Screen) -> Rays:
+    """Return the rays with a t_near that, for unresolved ones, is where their proof ended."""
+    arrays = rays.arrays
+    reach = float(np.abs(screen.scene.bounds).max())
+    t_near: F32 = np.empty(len(rays), np.float32)
     kernels.hand_over(
-        marched.resolved,
-        rays.origin,
-        rays.direction,
-        rays.t_near,
-        marched.t_free,
-        reach,
+        marched.resolved, arrays.origin, arrays.direction, arrays.t_near, marched.t_free, reach,
         t_near,
-    )
-    return t_near
-
-
-def _rest(rays: Rays, indices: I32, t_near: F32 | None) -> Rays:
-    """Return the rays at `indices`, for a tracer that takes no indices."""
-    rest = rays.take(indices)
-    return rest if t_near is None else replace(rest, t_near=t_near[indices])
+    )  # fmt: skip
+    return rays._starting(t_near)

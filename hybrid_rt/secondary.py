@@ -31,6 +31,7 @@ import numpy as np
 
 from hybrid_rt import _check
 from hybrid_rt.errors import ArgumentError
+from hybrid_rt.kernels.arrays import RayArrays
 from hybrid_rt.kernels.secondary import surface as kernels
 from hybrid_rt.raster.gbuffer import GBuffer
 from hybrid_rt.rays.rays import Rays
@@ -89,9 +90,7 @@ def glossy_rays(gbuffer: GBuffer, roughness: float, seed: int = 0) -> Rays:
     E. Heitz, "Sampling the GGX distribution of visible normals", Journal of Computer Graphics
     Techniques 7 (4), 2018.
     """
-    value = _check.real("roughness", roughness)
-    if not 0.0 <= value <= 1.0:
-        raise ArgumentError("roughness", "a number from 0 to 1", _check.describe(roughness))
+    value = _check.fraction("roughness", roughness)
     return _surface_rays(gbuffer, kernels.GLOSSY, alpha=value * value, seed=seed)
 
 
@@ -141,10 +140,7 @@ def ambient_occlusion_rays(gbuffer: GBuffer, radius: float, seed: int = 0) -> Ra
     ArgumentError
         A radius or a seed out of range.
     """
-    reach = _check.real("radius", radius, above=0.0)
-    limits = np.finfo(np.float32)
-    if not float(limits.tiny) <= reach <= float(limits.max):
-        raise ArgumentError("radius", "a length within float32", _check.describe(radius))
+    reach = _check.float32_length("radius", radius)
     return _surface_rays(gbuffer, kernels.COSINE, reach=reach, seed=seed)
 
 
@@ -202,10 +198,10 @@ def _surface_rays(
     tiles_x = -(-camera.width // kernels.TILE)
     tiles_y = -(-camera.height // kernels.TILE)
     counts = np.empty(tiles_x * tiles_y, np.int64)
-    kernels.count_covered(gbuffer.prim_id, tiles_x, counts)
+    kernels.count_covered(gbuffer.arrays.prim_id, tiles_x, counts)
     starts = np.cumsum(counts) - counts
     n = int(counts.sum())
-    rays = Rays(
+    out = RayArrays(
         np.empty((n, 3), np.float32),
         np.empty((n, 3), np.float32),
         np.empty((n, 2), np.int32),
@@ -219,10 +215,10 @@ def _surface_rays(
         reach,
         np.array(light),
         _check.integer("seed", seed, least=0, most=LARGEST_SEED),
-        gbuffer.prim_id,
-        gbuffer.depth,
-        gbuffer.scene.vertices,
-        gbuffer.scene.faces,
+        gbuffer.arrays.prim_id,
+        gbuffer.arrays.depth,
+        gbuffer.scene.arrays.vertices,
+        gbuffer.scene.arrays.faces,
         np.array(camera.eye),
         np.array(camera.right),
         np.array(camera.up),
@@ -231,11 +227,8 @@ def _surface_rays(
         camera.near,
         tiles_x,
         starts,
-        rays.origin,
-        rays.direction,
-        rays.pixel,
-        rays.t_near,
-        rays.t_far,
+        *out,
         kept,
     )
+    rays = Rays._made(out, scene=gbuffer.scene, camera=camera)
     return rays if kept.all() else rays.take(kept)

@@ -8,16 +8,15 @@ The rest of the program asks this registry and names no kind. A kind comes from 
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
-import pkgutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any
 
-from hybrid_rt.errors import ArgumentError, UnknownNameError
+from hybrid_rt.errors import ArgumentError
+from hybrid_rt.registry import Registry
 from hybrid_rt_bench.options import Option
 
 if TYPE_CHECKING:
@@ -26,88 +25,6 @@ if TYPE_CHECKING:
     from hybrid_rt_bench.report.table import Table
     from hybrid_rt_bench.results.folder import RunData
     from hybrid_rt_bench.results.schema import Schema
-
-
-class Named(Protocol):
-    """What can be registered."""
-
-    @property
-    def name(self) -> str:
-        """Unique in its registry."""
-        ...
-
-
-Thing = TypeVar("Thing", bound=Named)
-
-
-class Registry(Mapping[str, Thing], Generic[Thing]):
-    """Things by name, in alphabetical order.
-
-    Parameters
-    ----------
-    what : str
-        What a thing is called in messages.
-    group : str
-        Entry points whose objects are registered; one that cannot be loaded costs only itself.
-    package : str, optional
-        Its modules and packages are imported, and register what they have.
-    """
-
-    def __init__(self, what: str, group: str, package: str | None = None) -> None:
-        self.what, self.group, self.package = what, group, package
-        self.broken: dict[str, str] = {}
-        self._things: dict[str, Thing] = {}
-        self._filled = False
-
-    def register(self, thing: Thing) -> Thing:
-        """Add a thing and return it.
-
-        Raises
-        ------
-        ArgumentError
-            Another one has its name.
-        """
-        if self._things.get(thing.name, thing) is not thing:
-            raise ArgumentError(self.what, "a name that is not taken", repr(thing.name))
-        self._things[thing.name] = thing
-        return thing
-
-    def names(self) -> list[str]:
-        """Return all names."""
-        self._fill()
-        return sorted(self._things)
-
-    def __getitem__(self, name: str) -> Thing:
-        self._fill()
-        if name in self._things:
-            return self._things[name]
-        if name in self.broken:
-            raise ArgumentError(self.what, f"one that can be loaded ({self.broken[name]})", name)
-        raise UnknownNameError(self.what, name, self.names())
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.names())
-
-    def __len__(self) -> int:
-        return len(self.names())
-
-    def __contains__(self, name: object) -> bool:
-        self._fill()
-        return name in self._things
-
-    def _fill(self) -> None:
-        if self._filled:
-            return
-        self._filled = True
-        if self.package is not None:
-            package = importlib.import_module(self.package)
-            for module in pkgutil.iter_modules(package.__path__, self.package + "."):
-                importlib.import_module(module.name)
-        for point in importlib.metadata.entry_points(group=self.group):
-            try:
-                self.register(point.load())
-            except Exception as error:
-                self.broken[point.name] = f"{type(error).__name__}: {error}"
 
 
 @dataclass(frozen=True)
@@ -199,7 +116,13 @@ class Kind:
         return getattr(importlib.import_module(module, self.package), name)
 
 
-kinds: Registry[Kind] = Registry("kind", "hybrid_rt.experiments", "hybrid_rt_bench.kinds")
+class _Kinds(Registry[Kind]):
+    def check(self, thing: Any) -> None:
+        if not isinstance(thing, Kind):
+            raise ArgumentError("kind", "a Kind", repr(thing))
+
+
+kinds: Registry[Kind] = _Kinds("kind", "hybrid_rt.experiments", "hybrid_rt_bench.kinds")
 """Every kind of experiment."""
 
 register = kinds.register

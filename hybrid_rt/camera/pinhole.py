@@ -1,4 +1,4 @@
-"""Project world points to the screen and back."""
+"""A pinhole camera; world points to the screen and back."""
 
 from __future__ import annotations
 
@@ -9,8 +9,17 @@ from typing import Any
 import numpy as np
 
 from hybrid_rt import _check
-from hybrid_rt._arrays import F64
 from hybrid_rt.errors import ArgumentError
+from hybrid_rt.kernels.arrays import F64, ViewArrays
+
+Vector = tuple[float, float, float]
+NARROWEST = 1e-30
+"""Degrees; any narrower, and a pixel's place is beyond float64."""
+AXES = ("right", "up", "forward")
+LARGEST_SIDE = 32768
+"""Pixels along a side: what the raster's fixed-point coordinates hold."""
+ORTHONORMAL = 1e-9
+"""By how much products of the axes, which have length 1, may be off."""
 
 
 @dataclass(frozen=True)
@@ -30,14 +39,34 @@ class Camera:
         Distance of the near plane along `forward`, world units.
     """
 
-    eye: tuple[float, float, float]
-    right: tuple[float, float, float]
-    up: tuple[float, float, float]
-    forward: tuple[float, float, float]
+    eye: Vector
+    right: Vector
+    up: Vector
+    forward: Vector
     vfov_deg: float
     width: int
     height: int
     near: float
+
+    def __post_init__(self) -> None:
+        checked = {
+            **{name: _check.vector3(name, getattr(self, name)) for name in ("eye", *AXES)},
+            "vfov_deg": _check.real("vfov_deg", self.vfov_deg, above=NARROWEST, below=180.0),
+            "width": _check.integer("width", self.width, least=1, most=LARGEST_SIDE),
+            "height": _check.integer("height", self.height, least=1, most=LARGEST_SIDE),
+            "near": _check.float32_length("near", self.near),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+        if max(map(abs, self.eye)) > float(np.finfo(np.float32).max):
+            expected = "coordinates within float32, as vertices have them"
+            raise ArgumentError("eye", expected, _check.describe(self.eye))
+        axes = np.array([self.right, self.up, self.forward])
+        for k, name in enumerate(AXES):
+            long = np.abs(axes[k]).max() > 2.0
+            if long or np.abs(axes @ axes[k] - np.eye(3)[k]).max() > ORTHONORMAL:
+                expected = "an axis of length 1 at right angles to the other two"
+                raise ArgumentError(name, expected, _check.describe(getattr(self, name)))
 
     @classmethod
     def look_at(
@@ -72,12 +101,13 @@ class Camera:
         eye3 = np.array(_check.vector3("eye", eye))
         target3 = np.array(_check.vector3("target", target))
         up3 = np.array(_check.vector3("up", up))
-        forward = target3 - eye3
-        distance = float(np.linalg.norm(forward))
+        with np.errstate(over="ignore"):
+            forward = target3 - eye3
+        distance = math.hypot(*forward)
         if distance == 0.0 or not math.isfinite(distance):
             raise ArgumentError("target", "a point other than eye", _check.describe(target))
         forward = forward / distance
-        length = float(np.linalg.norm(up3))
+        length = math.hypot(*up3)
         if length == 0.0 or not math.isfinite(length):
             raise ArgumentError("up", "a direction of finite length > 0", _check.describe(up))
         right = np.cross(forward, up3 / length)
@@ -90,19 +120,15 @@ class Camera:
             right=_vec(right),
             up=_vec(np.cross(right, forward)),
             forward=_vec(forward),
-            vfov_deg=_check.real("vfov_deg", vfov_deg, above=0.0, below=180.0),
-            width=_check.integer("width", width, least=1, most=32768),
-            height=_check.integer("height", height, least=1, most=32768),
-            near=_check.real("near", near, above=0.0),
+            vfov_deg=vfov_deg,
+            width=width,
+            height=height,
+            near=near,
         )
 
     def resized(self, width: int, height: int) -> Camera:
         """Return the same view with another number of pixels; the vertical field of view stays."""
-        return replace(
-            self,
-            width=_check.integer("width", width, least=1, most=32768),
-            height=_check.integer("height", height, least=1, most=32768),
-        )
+        return replace(self, width=width, height=height)
 
     def widened(self, factor: float) -> Camera:
         """Return a view `factor` times as wide and as high around the same axis.
@@ -124,6 +150,11 @@ class Camera:
         height = max(1, round(self.height * factor))
         wider = self.resized(max(1, round(self.width * factor)), height)
         return replace(wider, vfov_deg=math.degrees(2.0 * math.atan(0.5 * height / self.focal_px)))
+
+    @property
+    def arrays(self) -> ViewArrays:
+        """The projection, as kernels take it."""
+        return ViewArrays(self.pixel_from_world, np.array(self.eye), self.near)
 
     @property
     def focal_px(self) -> float:
@@ -158,7 +189,7 @@ class Camera:
         return np.stack([np.array(self.right) / f, -np.array(self.up) / f, np.array(self.forward)])
 
 
-def _vec(v: F64) -> tuple[float, float, float]:
+def _vec(v: F64) -> Vector:
     return float(v[0]), float(v[1]), float(v[2])
 
 
@@ -178,8 +209,8 @@ def project(camera: Camera, points_w: Any) -> F64:
     """
     _check.instance("camera", camera, Camera)
     p = _check.array("points_w", points_w, ("N", 3), np.float64)
-    q = (p - np.array(camera.eye)) @ camera.pixel_from_world.T
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        q = (p - np.array(camera.eye)) @ camera.pixel_from_world.T
         return np.asarray(
             np.stack([q[:, 0] / q[:, 2], q[:, 1] / q[:, 2], camera.near / q[:, 2]], axis=1)
         )
@@ -200,7 +231,7 @@ def unproject(camera: Camera, points_px: Any) -> F64:
     """
     _check.instance("camera", camera, Camera)
     s = _check.array("points_px", points_px, ("N", 3), np.float64)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         z = camera.near / s[:, 2]
         x_v = (s[:, 0] - 0.5 * camera.width) / camera.focal_px
         y_v = (0.5 * camera.height - s[:, 1]) / camera.focal_px

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from numba import njit
 
-kernel = njit(cache=True, nogil=True, error_model="numpy", fastmath=False)
+OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": False}
+
+kernel = njit(cache=True, **OPTIONS)
 """A function called from Python, or from other kernels, on one thread."""
 
-parallel_kernel = njit(cache=True, nogil=True, error_model="numpy", fastmath=False, parallel=True)
+parallel_kernel = njit(cache=True, parallel=True, **OPTIONS)
 """A function whose `prange` loops run on all threads; outputs must not depend on how many."""
 
-inlined = njit(cache=True, nogil=True, error_model="numpy", fastmath=False, forceinline=True)
+inlined = njit(cache=True, forceinline=True, **OPTIONS)
 """A named piece of a kernel body; LLVM puts it in place."""

@@ -64,7 +64,7 @@ def longest(vectors, i, end):
 def hand_over(resolved, origin, direction, t_near, t_free, reach, starts):
     """Write where a tracer in float32 has to start on rays that are proven free up to t_free.
 
-    starts (N,) float32 is written for the unresolved rays: never less than t_near.
+    starts (N,) float32: t_near for resolved rays, and never less than that for the others.
 
     The tracer's own t errs, by 3e-7 of t on ordinary triangles and, on large ones that are seen at
     a grazing angle, by as much of the scene's `reach` over the sine: a hit just behind t_free must
@@ -76,14 +76,17 @@ def hand_over(resolved, origin, direction, t_near, t_free, reach, starts):
         end = min(n, (chunk + 1) * CHUNK)
         for i in range(chunk * CHUNK, end, simd.WIDTH):
             rest = unresolved(resolved, i, end)
+            live = simd.first(end - i)
+            near = simd.load_masked(t_near, i, live, 0.0)
+            start = near
             if simd.any_(rest):
                 far = simd.to_f64(simd.load_masked(t_free, i, rest, 0.0)) * HAND_OVER_BACK
                 slack = HAND_OVER_REACH * (longest(origin, i, end) + reach)
-                start = far - slack / longest(direction, i, end)
-                near = simd.load_masked(t_near, i, rest, 0.0)
+                free = far - slack / longest(direction, i, end)
                 # False for the NaN of a ray without direction.
-                later = start > simd.to_f64(near)
-                simd.store_masked(starts, i, simd.select(later, simd.to_f32(start), near), rest)
+                later = rest & (free > simd.to_f64(near))
+                start = simd.select(later, simd.to_f32(free), near)
+            simd.store_masked(starts, i, start, live)
 
 
 @inlined

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from hybrid_rt._arrays import F32, I32
+import numpy as np
+
+from hybrid_rt import _check
+from hybrid_rt._record import Record
 from hybrid_rt.camera.pinhole import Camera
-from hybrid_rt.raster.lists import PrimitiveLists
+from hybrid_rt.errors import ArgumentError
+from hybrid_rt.kernels.arrays import F32, I32, GBufferArrays
 from hybrid_rt.scene.mesh import Scene
 
 
 @dataclass(frozen=True, eq=False)
-class GBuffer:
-    """What the rasteriser writes for one view.
+class GBuffer(Record):
+    """What a view shows: `rasterize` makes one, and so can anything that has a depth buffer.
 
     Attributes
     ----------
@@ -21,15 +25,25 @@ class GBuffer:
     ddx, ddy : (H, W) float32
         Change of `depth` for one pixel to the right and one pixel down.
     prim_id : (H, W) int32
-        Index into ``scene.faces``, -1 where nothing is visible.
+        Index into ``scene.faces``, -1 where nothing is visible, and only there.
     scene : Scene
     camera : Camera
-    lists : PrimitiveLists, optional
-        What mode "certified" reads, if the rasteriser was asked for it.
+        Of H by W pixels.
     timings : dict of str to float
         Seconds of the stages of `rasterize`: "vertices" (projecting them), "cull" (which faces may
         cover a pixel), "records" (their planes, and the tiles they are put into), "tiles" (drawing
         these and writing the images); with JIT compilation in a first call.
+
+    Raises
+    ------
+    ArgumentError
+        Images of another shape or dtype than said, a depth that is negative or not finite, a
+        prim_id that the scene does not have or that says otherwise than the depth whether anything
+        is visible.
+
+    Notes
+    -----
+    The arrays are copied, and read-only from then on.
     """
 
     depth: F32
@@ -38,5 +52,35 @@ class GBuffer:
     prim_id: I32
     scene: Scene
     camera: Camera
-    lists: PrimitiveLists | None = None
     timings: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        _check.instance("scene", self.scene, Scene)
+        _check.instance("camera", self.camera, Camera)
+        shape = self.camera.height, self.camera.width
+        images = {
+            name: _check.owned(name, getattr(self, name), shape, np.float32)
+            for name in ("depth", "ddx", "ddy")
+        }
+        for name, image in images.items():
+            _check.finite_rows(name, image.reshape(-1, 1), "values")
+        if (images["depth"] < 0).any():
+            raise ArgumentError("depth", "values >= 0", f"{images['depth'].min()}")
+        prim_id = _check.owned("prim_id", self.prim_id, shape, np.int32)
+        faces = len(self.scene)
+        _check.in_range("prim_id", prim_id, -1, faces - 1, f"the scene has {faces} triangles")
+        odd = np.argwhere((images["depth"] > 0) != (prim_id >= 0))
+        if len(odd):
+            y, x = (int(k) for k in odd[0])
+            raise ArgumentError(
+                "prim_id",
+                "-1 where depth is 0, and only there",
+                f"{prim_id[y, x]} at pixel ({x}, {y}), where depth is {images['depth'][y, x]:g}",
+            )
+        self._own(GBufferArrays(images["depth"], images["ddx"], images["ddy"], prim_id))
+
+    @property
+    def arrays(self) -> GBufferArrays:
+        """All images, in the order of the attributes, as kernels take them."""
+        arrays: GBufferArrays = self._arrays
+        return arrays

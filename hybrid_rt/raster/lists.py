@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from hybrid_rt import _threads
-from hybrid_rt._arrays import F32, I32
 from hybrid_rt.camera.pinhole import Camera
+from hybrid_rt.kernels.arrays import F32, I32, ListArrays
 from hybrid_rt.kernels.raster import lists as kernels
 from hybrid_rt.kernels.raster import lists_bins as bin_kernels
 from hybrid_rt.kernels.raster.bins import TILE, prefix_sums
+from hybrid_rt.kernels.raster.lists_planes import PLANE_ROW
 from hybrid_rt.scene.mesh import Scene
 
 
@@ -33,11 +34,11 @@ class PrimitiveLists:
         Upper bound of the depth of everything that is not in the list; 0 if that is nothing.
     planes : (F, 8) float32
         For each face that is in a list the plane of its depth, with its error; see
-        `kernels.raster.lists`. NaN where there is none to be trusted. Rows of faces that are in
-        no list mean nothing.
+        `kernels.raster.lists_planes`. NaN where there is none to be trusted. Rows of faces that
+        are in no list mean nothing.
     margin_px : float
     camera : Camera
-        Whose pixels these are; not always that of the G-buffer, see `rasterize`.
+        Whose pixels these are; not always that of the G-buffer, see `hybrid_rt.Certified`.
     """
 
     prim_id: I32
@@ -48,6 +49,11 @@ class PrimitiveLists:
     camera: Camera
 
     @property
+    def arrays(self) -> ListArrays:
+        """All arrays, as kernels take them."""
+        return ListArrays(self.prim_id, self.nearest, self.rest, self.planes)
+
+    @property
     def length(self) -> int:
         """K, the largest number of primitives in a list."""
         return int(self.prim_id.shape[2])
@@ -55,7 +61,7 @@ class PrimitiveLists:
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays: 8 K + 4 a pixel, 32 a face."""
-        return sum(a.nbytes for a in (self.prim_id, self.nearest, self.rest, self.planes))
+        return sum(array.nbytes for array in self.arrays)
 
 
 MARGIN_ULPS = 16
@@ -70,17 +76,17 @@ def primitive_lists(
 ) -> PrimitiveLists:
     """Return for each pixel the `length` primitives that can be nearest anywhere in its square.
 
-    Arguments as `hybrid_rt.rasterize` has checked them.
+    Arguments as `hybrid_rt.Certified` has checked them.
     """
     width, height, near = camera.width, camera.height, float(camera.near)
     margin = MARGIN_ULPS * 2.0**-24 * (max(width, height) + 1)
     prim_id = np.empty((height, width, length), np.int32)
     nearest = np.empty((height, width, length), np.float32)
     rest = np.empty((height, width), np.float32)
-    vertices, faces = scene.vertices, scene.faces
-    planes = np.zeros((len(faces), kernels.PLANE_ROW), np.float32)
-    eye = np.array(camera.eye, np.float64)
-    m, frame = camera.pixel_from_world, camera.world_from_pixel
+    vertices, faces = scene.arrays.vertices, scene.arrays.faces
+    planes = np.zeros((len(faces), PLANE_ROW), np.float32)
+    m, eye, _ = camera.arrays
+    frame = camera.world_from_pixel
     tiles_x = -(-width // TILE)
     tiles = tiles_x * -(-height // TILE)
     boxes = np.empty(len(vertices), np.int64)

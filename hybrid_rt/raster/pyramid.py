@@ -1,68 +1,101 @@
-"""Build the depth pyramid of a view."""
+"""Depth pyramids: the nearest depth of 1, 4, 16 ... pixels."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from hybrid_rt import _check, _threads
-from hybrid_rt._arrays import F32, I64
+from hybrid_rt._record import Record
+from hybrid_rt.camera.pinhole import LARGEST_SIDE
 from hybrid_rt.errors import ArgumentError
+from hybrid_rt.kernels.arrays import F32, I64, PyramidArrays
 from hybrid_rt.kernels.raster import pyramid as kernels
 from hybrid_rt.raster.gbuffer import GBuffer
 
+Levels = tuple[I64, I64, I64, I64]
+"""Offsets, pitches, widths and heights of all levels, (L,) int64 each."""
 
-@dataclass(frozen=True, eq=False)
-class DepthPyramid:
-    """Nearest depth of 1, 4, 16 ... pixels; level 0 is the depth buffer itself.
+
+class Pyramid(Record):
+    """What pyramids are alike in: levels of cells over an image of `width` by `height` pixels.
 
     Level l has ``ceil(W / 2**l)`` by ``ceil(H / 2**l)`` cells and ends at 1 by 1, so the cell of a
     pixel is always ``(x >> l, y >> l)``.
-
-    Attributes
-    ----------
-    data : (cells,) float32
-        All levels, row by row, each padded to powers of two; see `hybrid_rt.raster.pyramid.layout`.
-    offsets : (L,) int64
-        Index of the first cell of each level in `data`.
-    pitches : (L,) int64
-        Cells from the start of a row of a level to the start of the next.
-    widths, heights : (L,) int64
-        Cells of a level without its padding.
-    conservative : bool
-        Whether the depths are those of pixel squares (the first bounds of `PrimitiveLists`) and
-        not those of pixel centres.
     """
 
     data: F32
-    offsets: I64
-    pitches: I64
-    widths: I64
-    heights: I64
-    conservative: bool = False
+    width: int
+    height: int
+    _values: tuple[int, ...] = ()  # numbers of a cell, as a shape
+
+    def __post_init__(self) -> None:
+        for name in ("width", "height"):
+            value = _check.integer(name, getattr(self, name), least=1, most=LARGEST_SIDE)
+            object.__setattr__(self, name, value)
+        cells, _ = layout(self.width, self.height)
+        data = _check.owned("data", self.data, ("C", *self._values), np.float32)
+        if len(data) != cells:
+            expected = f"{cells} cells, as many as {self.width} by {self.height} pixels have"
+            raise ArgumentError("data", expected, f"{len(data)}")
+        self._own(Cells(data))
+
+    @cached_property
+    def _levels(self) -> Levels:
+        return layout(self.width, self.height)[1]
+
+    @property
+    def arrays(self) -> PyramidArrays:
+        """Cells, offsets and pitches, as kernels take them."""
+        return PyramidArrays(self._arrays.data, self._levels[0], self._levels[1])
 
     def __len__(self) -> int:
-        return len(self.offsets)
+        return len(self._levels[0])
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all cells."""
+        return int(self.data.nbytes)
 
     def level(self, index: int) -> F32:
-        """Return level `index` as a (height, width) view of `data`."""
+        """Return level `index` as a (height, width, ...) view of `data`, without its padding."""
         n = _check.integer("index", index, least=0, most=len(self) - 1)
-        return level_of(self, n)
+        start, pitch, width, height = (int(values[n]) for values in self._levels)
+        rows = self.data[start : start + height * pitch]
+        return np.asarray(rows.reshape(height, pitch, *self._values)[:, :width])
 
 
-def build_depth_pyramid(
-    gbuffer: GBuffer, *, conservative: bool = False, threads: int | None = None
-) -> DepthPyramid:
+@dataclass(frozen=True, eq=False)
+class DepthPyramid(Pyramid):
+    """Nearest depth of 1, 4, 16 ... pixels; level 0 is the depth buffer itself.
+
+    Attributes
+    ----------
+    data : (C,) float32
+        The cells of all levels, row by row, each level padded to powers of two; see `layout`.
+    width, height : int
+        Pixels of the image.
+
+    Raises
+    ------
+    ArgumentError
+        Another number of cells than the image has.
+    """
+
+    data: F32
+    width: int
+    height: int
+
+
+def build_depth_pyramid(gbuffer: GBuffer, *, threads: int | None = None) -> DepthPyramid:
     """Return the nearest depth of every 1, 4, 16 ... pixels, up to one cell for the whole image.
 
     Parameters
     ----------
     gbuffer : GBuffer
-    conservative : bool
-        Of the nearest depth anywhere in a pixel's square, from the G-buffer's lists, which mode
-        "certified" needs, instead of the depth at its centre. It has the size of the lists.
     threads : int, optional
         Default: as many as Numba is set to.
 
@@ -75,13 +108,11 @@ def build_depth_pyramid(
     Raises
     ------
     ArgumentError
-        `gbuffer` is not a GBuffer, or has no lists for a conservative pyramid; `threads` is out of
-        range.
+        `gbuffer` is not a GBuffer; `threads` is out of range.
 
     Notes
     -----
-    Nearest is the largest depth. The input is never written. The result has the same bits for any
-    number of threads.
+    Nearest is the largest depth. The result has the same bits for any number of threads.
 
     References
     ----------
@@ -89,19 +120,23 @@ def build_depth_pyramid(
     stops at floor(log2(min(W, H))) levels above the first; here all of them are built.
     """
     _check.instance("gbuffer", gbuffer, GBuffer)
-    depth = gbuffer.depth
-    if conservative:
-        if gbuffer.lists is None:
-            raise ArgumentError(
-                "gbuffer", "one with lists, from rasterize(..., lists=8)", "one without"
-            )
-        depth = np.ascontiguousarray(gbuffer.lists.nearest[:, :, 0])
+    return pyramid_of(gbuffer.arrays.depth, threads)
+
+
+def pyramid_of(depth: F32, threads: int | None) -> DepthPyramid:
+    """Return the pyramid of depths (H, W) float32, C-contiguous."""
     height, width = depth.shape
     cells, levels = layout(width, height)
     data = np.empty(cells, np.float32)
     with _threads.limited(threads):
         kernels.build(depth, *levels, data)
-    return DepthPyramid(data, *levels, conservative)
+    return DepthPyramid._made(Cells(data), width=width, height=height)
+
+
+class Cells(NamedTuple):
+    """The one array of a pyramid that is its own."""
+
+    data: F32
 
 
 def bits(width: int, height: int) -> tuple[int, int]:
@@ -109,7 +144,7 @@ def bits(width: int, height: int) -> tuple[int, int]:
     return (width - 1).bit_length(), (height - 1).bit_length()
 
 
-def layout(width: int, height: int) -> tuple[int, tuple[I64, I64, I64, I64]]:
+def layout(width: int, height: int) -> tuple[int, Levels]:
     """Return how many cells to make room for and where the levels of a pyramid lie.
 
     The levels are given by their offsets, pitches, widths and heights, (L,) int64 each. A level is
@@ -125,11 +160,3 @@ def layout(width: int, height: int) -> tuple[int, tuple[I64, I64, I64, I64]]:
     widths, heights = -(-width >> level), -(-height >> level)
     offsets, pitches = 1 << (columns + rows), 1 << columns
     return int(offsets[0] + pitches[0] * height), (offsets, pitches, widths, heights)
-
-
-def level_of(pyramid: Any, n: int) -> F32:
-    """Return level n, (height, width, ...), as a view without its padding."""
-    start, pitch = int(pyramid.offsets[n]), int(pyramid.pitches[n])
-    height, width = int(pyramid.heights[n]), int(pyramid.widths[n])
-    rows = pyramid.data[start : start + height * pitch]
-    return np.asarray(rows.reshape(height, pitch, *pyramid.data.shape[1:])[:, :width])

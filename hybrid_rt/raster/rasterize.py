@@ -8,24 +8,20 @@ from typing import Literal
 import numpy as np
 
 from hybrid_rt import _check, _threads
-from hybrid_rt._arrays import F32, I32
 from hybrid_rt.camera.pinhole import Camera
-from hybrid_rt.errors import ArgumentError
+from hybrid_rt.kernels.arrays import I32, GBufferArrays
 from hybrid_rt.kernels.raster import tiles as kernels
 from hybrid_rt.kernels.raster.bins import TILE, prefix_sums
 from hybrid_rt.kernels.raster.clip import transform_vertices
 from hybrid_rt.kernels.raster.cull import LANES, cull_and_count
 from hybrid_rt.kernels.raster.records import ROW, fill_bins
 from hybrid_rt.raster.gbuffer import GBuffer
-from hybrid_rt.raster.lists import primitive_lists
 from hybrid_rt.scene.mesh import Scene
 
 BATCH_FACES = 1 << 21
 """Faces that go through together; bounds the memory for records."""
 BATCH_ENTRIES = 1 << 25
 """Bin entries of one batch; a batch with more is cut in halves."""
-MAX_LISTS = 64
-"""Longest list of primitives a pixel that can be asked for."""
 CHUNKS = 64
 """Parts of a batch that threads take in turn."""
 
@@ -35,8 +31,6 @@ def rasterize(
     camera: Camera,
     *,
     derivatives: Literal["plane", "quad"] = "plane",
-    lists: int = 0,
-    lists_camera: Camera | None = None,
     threads: int | None = None,
 ) -> GBuffer:
     """Return the visible surface at every pixel's centre.
@@ -52,14 +46,6 @@ def rasterize(
         quad of 2x2 pixels, ddx once for each row and ddy once for each column of the quad. Across
         a silhouette a quad's differences mix two surfaces. The last column or row of an odd size
         takes the neighbour it has; an image one pixel wide has ddx 0, one pixel high ddy 0.
-    lists : int
-        Longest list of primitives that is kept for each pixel square, 0 to 64, for mode
-        "certified"; 8 bytes a primitive and pixel. 0, no lists, costs nothing.
-    lists_camera : Camera, optional
-        The view in whose pixels the lists are made; default: `camera`. Proofs need no pixel of the
-        image, so the lists may have larger pixels (``camera.resized(width // 4, height // 4)``:
-        cheaper to make and to walk through) or reach beyond the screen (``camera.widened(2.0)``:
-        rays that leave the screen stay in sight).
     threads : int, optional
         Default: as many as Numba is set to.
 
@@ -70,8 +56,7 @@ def rasterize(
     Raises
     ------
     ArgumentError
-        An argument of the wrong type, an unknown `derivatives`, `lists` or `threads` out of range,
-        a `lists_camera` without lists.
+        An argument of the wrong type, an unknown `derivatives`, `threads` out of range.
 
     Notes
     -----
@@ -100,25 +85,19 @@ def rasterize(
     _check.instance("scene", scene, Scene)
     _check.instance("camera", camera, Camera)
     _check.choice("derivatives", derivatives, ("plane", "quad"))
-    length = _check.integer("lists", lists, least=0, most=MAX_LISTS)
-    view = camera if lists_camera is None else lists_camera
-    _check.instance("lists_camera", view, Camera)
-    if lists_camera is not None and length == 0:
-        raise ArgumentError("lists_camera", "None where lists is 0", "a Camera")
-    depth, ddx, ddy, prim_id = _images(camera.height, camera.width)
+    images = _images(camera.height, camera.width)
     with _threads.limited(threads) as workers:
-        timings = _draw(scene, camera, workers, depth, ddx, ddy, prim_id)
+        timings = _draw(scene, camera, workers, images)
         if derivatives == "quad":
-            kernels.quad_differences(depth, ddx, ddy)
-    found = primitive_lists(scene, view, length, threads) if length else None
-    return GBuffer(depth, ddx, ddy, prim_id, scene, camera, found, timings)
+            kernels.quad_differences(images.depth, images.ddx, images.ddy)
+    return GBuffer._made(images, scene=scene, camera=camera, timings=timings)
 
 
-def _images(height: int, width: int) -> tuple[F32, F32, F32, I32]:
+def _images(height: int, width: int) -> GBufferArrays:
     """Return room for depth, ddx, ddy and prim_id: one block, which few pages need be found for."""
     block = _in_lines(4 * height * width).reshape(4, height, width)
     depth, ddx, ddy = block[:3].view(np.float32)
-    return depth, ddx, ddy, block[3]
+    return GBufferArrays(depth, ddx, ddy, block[3])
 
 
 def _in_lines(n: int) -> I32:
@@ -128,9 +107,7 @@ def _in_lines(n: int) -> I32:
     return raw[start : start + n]
 
 
-def _draw(
-    scene: Scene, camera: Camera, workers: int, depth: F32, ddx: F32, ddy: F32, prim_id: I32
-) -> dict[str, float]:
+def _draw(scene: Scene, camera: Camera, workers: int, images: GBufferArrays) -> dict[str, float]:
     """Draw all faces over the images, a batch at a time; return the seconds of every stage."""
     timings = dict.fromkeys(("vertices", "cull", "records", "tiles"), 0.0)
     last_time = time.perf_counter()
@@ -141,10 +118,9 @@ def _draw(
         timings[stage] += now - last_time
         last_time = now
 
-    vertices, faces = scene.vertices, scene.faces
+    vertices, faces = scene.arrays.vertices, scene.arrays.faces
     width, height, near = camera.width, camera.height, float(camera.near)
-    eye = np.array(camera.eye, np.float64)
-    m = camera.pixel_from_world
+    m, eye, _ = camera.arrays
     frame = camera.world_from_pixel
     xy = np.empty(len(vertices), np.int64)
     transform_vertices(vertices, eye, m, width, height, near, xy)
@@ -183,7 +159,7 @@ def _draw(
         done("records")
         kernels.draw_tiles(
             tile_start, bins, records, tiles_x, 0.5 * width, 0.5 * height, workers,
-            first == 0, depth, ddx, ddy, prim_id,
+            first == 0, *images,
         )  # fmt: skip
         done("tiles")
         first = last

@@ -1,4 +1,4 @@
-"""Build the pyramid of planes that mode "slope" marches through."""
+"""Pyramids of planes in front of tilted pixels."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from hybrid_rt import _check, _threads
-from hybrid_rt._arrays import F32, I64
+from hybrid_rt.kernels.arrays import F32
 from hybrid_rt.kernels.raster import slope_pyramid as kernels
 from hybrid_rt.raster.gbuffer import GBuffer
-from hybrid_rt.raster.pyramid import DepthPyramid, layout, level_of
+from hybrid_rt.raster.pyramid import Cells, Pyramid, layout
 
 
 @dataclass(frozen=True, eq=False)
-class SlopePyramid:
+class SlopePyramid(Pyramid):
     """For 1, 4, 16 ... pixels, a plane in front of all their tilted planes; as a DepthPyramid lies.
 
     The plane of cell (i, j) of level l is ``a + b_x (x - x_c) + b_y (y - y_c)`` with the cell's
@@ -24,25 +24,21 @@ class SlopePyramid:
 
     Attributes
     ----------
-    data : (cells, 3) float32
+    data : (C, 3) float32
         a, b_x, b_y, in depth and depth a pixel; the levels lie as in a DepthPyramid.
-    offsets, pitches, widths, heights : (L,) int64
-        As in a DepthPyramid.
+    width, height : int
+        Pixels of the image.
+
+    Raises
+    ------
+    ArgumentError
+        Another number of cells than the image has.
     """
 
     data: F32
-    offsets: I64
-    pitches: I64
-    widths: I64
-    heights: I64
-
-    def __len__(self) -> int:
-        return len(self.offsets)
-
-    def level(self, index: int) -> F32:
-        """Return level `index` as a (height, width, 3) view of `data`."""
-        n = _check.integer("index", index, least=0, most=len(self) - 1)
-        return level_of(self, n)
+    width: int
+    height: int
+    _values = (3,)
 
 
 def build_slope_pyramid(gbuffer: GBuffer, *, threads: int | None = None) -> SlopePyramid:
@@ -78,9 +74,5 @@ def build_slope_pyramid(gbuffer: GBuffer, *, threads: int | None = None) -> Slop
     cells, levels = layout(width, height)
     data = np.empty((cells, 3), np.float32)
     with _threads.limited(threads):
-        kernels.build(gbuffer.depth, gbuffer.ddx, gbuffer.ddy, *levels, data)
-    return SlopePyramid(data, *levels)
-
-
-Pyramid = DepthPyramid | SlopePyramid
-"""What a march goes through."""
+        kernels.build(*gbuffer.arrays[:3], *levels, data)
+    return SlopePyramid._made(Cells(data), width=width, height=height)

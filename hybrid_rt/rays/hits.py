@@ -7,7 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from hybrid_rt._arrays import F32, I32
+from hybrid_rt import _check
+from hybrid_rt.errors import ArgumentError
+from hybrid_rt.kernels.arrays import F32, I32, HitArrays
+
+LARGEST = 2**31 - 1
+"""Rays in one call: kernels number them in int32."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +40,7 @@ class Hits:
     @classmethod
     def empty(cls, n: int) -> Hits:
         """Return `n` misses, to be filled by a tracer."""
+        n = _check.integer("n", n, least=0, most=LARGEST)
         return cls(
             np.full(n, np.inf, np.float32),
             np.full(n, -1, np.int32),
@@ -46,6 +52,7 @@ class Hits:
     @classmethod
     def unfilled(cls, n: int) -> Hits:
         """Return room for `n` hits, with nothing in it yet, for code that writes every row."""
+        n = _check.integer("n", n, least=0, most=LARGEST)
         return cls(
             np.empty(n, np.float32),
             np.empty(n, np.int32),
@@ -55,14 +62,48 @@ class Hits:
         )
 
     @property
-    def arrays(self) -> tuple[F32, I32, F32, F32, F32]:
+    def arrays(self) -> HitArrays:
         """All arrays, in the order of the attributes, as kernels take them."""
-        return self.t, self.prim_id, self.u, self.v, self.n_g
+        return HitArrays(self.t, self.prim_id, self.u, self.v, self.n_g)
 
     def put(self, index: Any, values: Hits) -> None:
         """Write `values` into the rows selected by an index or boolean array."""
-        for mine, theirs in zip(self.arrays, values.arrays, strict=True):
-            mine[index] = theirs
+        _check.instance("values", values, Hits)
+        try:
+            for mine, theirs in zip(self.arrays, values.arrays, strict=True):
+                mine[index] = theirs
+        except Exception as error:  # an index of anything, arrays that are read-only
+            expected = f"rows of {len(self)} writable hits, as many as there are values"
+            raise ArgumentError("index", expected, f"{_check.describe(index)}: {error}") from error
+
+    def _checked(self, argument: str, n: int, faces: int) -> Hits:
+        """Return these hits if they can be those of N rays in a scene of so many faces.
+
+        Raises
+        ------
+        ArgumentError
+            Arrays of another length, shape or dtype, a prim_id that the scene does not have, a hit
+            whose t is not finite, a miss whose t is. `argument` is what they are called in it.
+        """
+        hits = Hits(
+            *(
+                _check.array(f"{argument}.{name}", getattr(self, name), shape, dtype)
+                for name, shape, dtype in (
+                    ("t", (n,), np.float32),
+                    ("prim_id", (n,), np.int32),
+                    ("u", (n,), np.float32),
+                    ("v", (n,), np.float32),
+                    ("n_g", (n, 3), np.float32),
+                )
+            )
+        )
+        _check.in_range(f"{argument}.prim_id", hits.prim_id, -1, faces - 1, f"{faces} triangles")
+        odd = np.flatnonzero(np.isfinite(hits.t) != (hits.prim_id >= 0))
+        if len(odd):
+            expected = "a finite t where prim_id names a triangle, infinity where it is -1"
+            got = f"t {hits.t[odd[0]]} and prim_id {hits.prim_id[odd[0]]} for ray {odd[0]}"
+            raise ArgumentError(f"{argument}.t", expected, got)
+        return hits
 
     def __len__(self) -> int:
         return len(self.t)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import re
 import zipfile
 import zlib
@@ -13,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 
+from hybrid_rt import _check
 from hybrid_rt.errors import ArgumentError, MeshFileError
 from hybrid_rt.scene.mesh import Mesh, Scene
 
@@ -59,11 +60,21 @@ def read_mesh(path: str | Path) -> Mesh:
     .stl) and otherwise where what is left makes no sense; an .obj cut after a whole face line is a
     valid smaller .obj.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise ArgumentError("path", "a str or a Path", _check.describe(path))
     path = Path(path)
-    if path.is_dir():
+    if "\0" in str(path):
+        raise ArgumentError("path", "a path without NUL characters", _check.describe(str(path)))
+    try:
+        folder, there = path.is_dir(), path.exists()
+    except OSError as error:  # a name that is too long, a folder that may not be looked into
+        raise MeshFileError(f"{path}: {error.strerror}") from error
+    if folder:
         raise MeshFileError(f"{path}: expected a mesh file, got a folder")
-    if not path.exists():
+    if not there:
         raise MeshFileError(f"{path}: no such file")
+    if not path.is_file():
+        raise MeshFileError(f"{path}: expected a regular file, got a device, pipe or socket")
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         known = " ".join(SUFFIXES)
@@ -113,11 +124,12 @@ def _read_trimesh(path: Path, suffix: str) -> Mesh:
         np.concatenate([v for v, _ in parts]),
         np.concatenate([f + start for (_, f), start in zip(parts, starts, strict=True)]),
         np.repeat(np.arange(len(parts)), [len(f) for _, f in parts]),
-        instances=len(parts),
     )
 
 
 def _open_with_trimesh(path: Path, suffix: str) -> Any:
+    import trimesh  # a second of work that an .npz does not need
+
     # skip_materials: a missing texture must not matter to geometry.
     if suffix == ".obj":
         text = _absolute_indices(path.read_text(encoding="utf-8", errors="replace"))
@@ -139,6 +151,8 @@ def _open_with_trimesh(path: Path, suffix: str) -> Any:
 
 def _instances(scene: Any, *, reverse: bool) -> Iterator[tuple[Any, Any]]:
     """Yield float64 world vertices and faces of each node of a scene graph that has triangles."""
+    import trimesh
+
     nodes = list(scene.graph.nodes_geometry)
     # trimesh pops the pieces of an .obj from its end.
     for node in reversed(nodes) if reverse else nodes:

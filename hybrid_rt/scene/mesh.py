@@ -10,132 +10,176 @@ from typing import Any
 import numpy as np
 
 from hybrid_rt import _check
-from hybrid_rt._arrays import F32, F64, I32
+from hybrid_rt._record import Record
 from hybrid_rt.errors import ArgumentError
+from hybrid_rt.kernels.arrays import F32, F64, I32, SceneArrays
+
+
+class _Triangles(Record):
+    """What meshes and scenes are alike in."""
+
+    vertices: F32
+    faces: I32
+    object_id: I32
+
+    def __post_init__(self) -> None:
+        v = _check.owned("vertices", self.vertices, ("V", 3), np.float32)
+        f = _check.owned("faces", self.faces, ("F", 3), np.int32)
+        if len(f) == 0:
+            raise ArgumentError("faces", "at least one triangle", "none")
+        _check.in_range("faces", f, 0, len(v) - 1, f"there are {len(v)} vertices")
+        _check.finite_rows("vertices", v, "float32 coordinates")
+        if self.object_id is None:
+            ids = np.zeros(len(f), np.int32)
+        else:
+            ids = _check.owned("object_id", self.object_id, ("F",), np.int32)
+            _check.same_length("object_id", ids, "faces", len(f))
+        self._own(SceneArrays(v, f, ids))
+
+    @property
+    def arrays(self) -> SceneArrays:
+        """Vertices, faces and object ids, as kernels take them."""
+        arrays: SceneArrays = self._arrays
+        return arrays
+
+    def __len__(self) -> int:
+        return len(self.faces)
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class Mesh(_Triangles):
     """Triangles as a file or a generator gives them.
 
     Attributes
     ----------
     vertices : (V, 3) float32, world
+        float64 is rounded to float32.
     faces : (F, 3) int32
-        Indices into `vertices`; both windings are visible.
+        Indices into `vertices`, F >= 1; both windings are visible.
     object_id : (F,) int32
-        Which object of the source a triangle belongs to; 0 where the source names none.
-    instances : int
-        How many instances of a scene graph were flattened into it (1 for a plain mesh).
+        Which object of the source a triangle belongs to; default 0.
+
+    Raises
+    ------
+    ArgumentError
+        Wrong shape or dtype, no faces, an index out of range, a vertex that is NaN or infinite
+        (also one that overflows float32).
+
+    Notes
+    -----
+    The arrays are copied, and read-only from then on.
     """
 
     vertices: F32
     faces: I32
-    object_id: I32
-    instances: int = 1
+    object_id: I32 = None  # type: ignore[assignment]
 
     @classmethod
-    def from_arrays(
-        cls, vertices: Any, faces: Any, object_id: Any = None, *, instances: int = 1
-    ) -> Mesh:
-        """Return a mesh from arrays, after checking every index and coordinate.
-
-        Parameters
-        ----------
-        vertices : (V, 3) array_like of float
-            World positions. float64 is rounded to float32.
-        faces : (F, 3) array_like of int
-            F >= 1.
-        object_id : (F,) array_like of int, optional
-        instances : int, optional
-
-        Raises
-        ------
-        ArgumentError
-            Wrong shape or dtype, no faces, an index out of range, a vertex that is NaN or infinite
-            (also one that overflows float32).
-        """
-        v = _check.array("vertices", vertices, ("V", 3), np.float32)
-        f = _check.array("faces", faces, ("F", 3), np.int32)
-        if len(f) == 0:
-            raise ArgumentError("faces", "at least one triangle", "none")
-        low, high = int(f.min()), int(f.max())
-        if low < 0 or high >= len(v):
-            bad = (f < 0) | (f >= len(v))
-            first = int(np.argmax(bad.any(axis=1)))
-            raise ArgumentError(
-                "faces",
-                f"indices from 0 to {len(v) - 1} (there are {len(v)} vertices)",
-                f"{int(bad.sum())} out of range, the first in face {first}: {f[first].tolist()}",
-            )
-        _check.finite_rows("vertices", v, "float32 coordinates")
-        if object_id is None:
-            ids = np.zeros(len(f), np.int32)
-        else:
-            ids = _check.array("object_id", object_id, ("F",), np.int32)
-            _check.same_length("object_id", ids, "faces", len(f))
-        return cls(v, f, ids, instances)
+    def from_arrays(cls, vertices: Any, faces: Any, object_id: Any = None) -> Mesh:
+        """Return a mesh from arrays; arguments and errors are those of the class."""
+        return cls(vertices, faces, object_id)
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Scene(_Triangles):
     """All triangles of a scene in one world, in the order that gives `prim_id` its meaning.
 
     Attributes
     ----------
-    vertices : (V, 3) float32, world
-    faces : (F, 3) int32
-    object_id : (F,) int32
+    vertices, faces, object_id
+        As in `Mesh`, with the same errors.
     name : str
-    zero_area : int
-        Triangles of exactly zero area. They are kept, so that `prim_id` stays the index into
-        `faces`, and no ray ever hits them.
+
+    Notes
+    -----
+    Triangles of exactly zero area are kept, so that `prim_id` stays the index into `faces`, and no
+    ray ever hits them.
     """
 
     vertices: F32
     faces: I32
-    object_id: I32
+    object_id: I32 = None  # type: ignore[assignment]
     name: str = "scene"
-    zero_area: int = 0
+
+    def __post_init__(self) -> None:
+        _check.text("name", self.name)
+        super().__post_init__()
 
     @classmethod
     def from_arrays(
         cls, vertices: Any, faces: Any, object_id: Any = None, *, name: str = "scene"
     ) -> Scene:
-        """Return a scene of one mesh; the arguments are those of `Mesh.from_arrays`."""
-        return cls.from_meshes([Mesh.from_arrays(vertices, faces, object_id)], name=name)
+        """Return a scene of one mesh; the arguments are those of the class."""
+        return cls(vertices, faces, object_id, name)
 
     @classmethod
     def from_meshes(cls, meshes: Sequence[Mesh], *, name: str = "scene") -> Scene:
         """Return a scene that holds `meshes` one after the other.
 
         Object ids are shifted so that those of different meshes stay apart.
+
+        Raises
+        ------
+        ArgumentError
+            No mesh, or something else among them; more vertices, triangles or object ids together
+            than int32 can number.
         """
-        if len(meshes) == 0:
-            raise ArgumentError("meshes", "at least one Mesh", "none")
+        _check.text("name", name)
+        if not isinstance(meshes, Sequence) or isinstance(meshes, str | bytes) or not meshes:
+            raise ArgumentError(
+                "meshes", "a sequence of at least one Mesh", _check.describe(meshes)
+            )
+        for mesh in meshes:
+            _check.instance("meshes", mesh, Mesh)
         vertices, faces, ids = [], [], []
         n_vertices, n_objects = 0, 0
         for mesh in meshes:
-            _check.instance("meshes", mesh, Mesh)
+            least, most = int(mesh.object_id.min()), int(mesh.object_id.max())
             vertices.append(mesh.vertices)
-            faces.append(mesh.faces + np.int32(n_vertices) if n_vertices else mesh.faces)
-            ids.append(mesh.object_id + np.int32(n_objects) if n_objects else mesh.object_id)
+            faces.append(mesh.faces + np.int64(n_vertices) if n_vertices else mesh.faces)
+            ids.append(mesh.object_id + np.int64(n_objects) if n_objects else mesh.object_id)
             n_vertices += len(mesh.vertices)
-            n_objects += int(mesh.object_id.max()) + 1
-        v, f = np.concatenate(vertices), np.concatenate(faces)
-        a, b, c = (v[f[:, k]].astype(np.float64) for k in range(3))
-        zero_area = int((np.cross(b - a, c - a) == 0).all(axis=1).sum())
-        return cls(v, f, np.concatenate(ids), name, zero_area)
+            n_objects += most + 1 if least >= 0 else most - least + 1
+        if max(n_vertices, n_objects) > np.iinfo(np.int32).max:
+            raise ArgumentError(
+                "meshes", "vertices and objects that int32 can number",
+                f"{n_vertices} vertices, {n_objects} objects",
+            )  # fmt: skip
+        arrays = SceneArrays(
+            np.concatenate(vertices),
+            np.concatenate(faces).astype(np.int32, copy=False),
+            np.concatenate(ids).astype(np.int32, copy=False),
+        )
+        return cls._made(arrays, name=name)
+
+    def same_as(self, other: Scene) -> bool:
+        """Return whether `other` has the same triangles in the same order."""
+        _check.instance("other", other, Scene)
+        return self is other or (
+            np.array_equal(self.faces, other.faces)
+            and np.array_equal(self.vertices, other.vertices)
+        )
+
+    @cached_property
+    def zero_area(self) -> int:
+        """Number of triangles of exactly zero area."""
+        a, b, c = (self.vertices[self.faces[:, k]].astype(np.float64) for k in range(3))
+        return int((np.cross(b - a, c - a) == 0).all(axis=1).sum())
 
     @cached_property
     def bounds(self) -> F64:
         """(2, 3) float64, world: the smallest and the largest corner of the used vertices."""
         used = self.vertices[self.faces.ravel()].astype(np.float64)
-        return np.stack([used.min(axis=0), used.max(axis=0)])
+        bounds = np.stack([used.min(axis=0), used.max(axis=0)])
+        bounds.flags.writeable = False
+        return bounds
 
     @cached_property
     def corners(self) -> F32:
-        """(F, 9) float32, world: the three vertices of each triangle, side by side, 36 bytes."""
+        """(F, 9) float32, world: the three vertices of each triangle, side by side, 36 bytes.
+
+        For kernels, hence writable; nobody writes it.
+        """
         return self.vertices[self.faces].reshape(-1, 9)
 
     @cached_property
@@ -143,6 +187,3 @@ class Scene:
         """Length of the bounding box's diagonal, world units: what a scene's lengths relate to."""
         low, high = self.bounds
         return float(np.linalg.norm(high - low))
-
-    def __len__(self) -> int:
-        return len(self.faces)

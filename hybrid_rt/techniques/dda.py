@@ -2,42 +2,76 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass
 
-import numpy as np
-
-from hybrid_rt import _threads
-from hybrid_rt.kernels.techniques import dda as kernels
-from hybrid_rt.raster.gbuffer import GBuffer
-from hybrid_rt.raster.pyramid import DepthPyramid
+from hybrid_rt import _check
+from hybrid_rt.base import Point, Screen, Technique, register
+from hybrid_rt.kernels.techniques.dda import PixelDDANumbers
+from hybrid_rt.rays.marched import Marched
 from hybrid_rt.rays.rays import Rays
-from hybrid_rt.techniques.marched import Marched
-from hybrid_rt.techniques.modes import PixelDDA
+from hybrid_rt.techniques import stepping
+from hybrid_rt.techniques.stepping import DEFAULT_THICKNESS, THICKNESSES, Share
 
 
-def march(
-    rays: Rays, gbuffer: GBuffer, pyramid: DepthPyramid, mode: PixelDDA, threads: int | None
-) -> Marched:
-    """Return what `PixelDDA` says about each ray; `hybrid_rt.march` has checked the arguments."""
-    height, width = gbuffer.depth.shape
-    max_steps = width + height + 2 if mode.max_steps is None else mode.max_steps
-    marched = Marched.unfilled(len(rays))
-    with _threads.limited(threads) as workers:
-        kernels.march(
-            workers,
-            *rays.arrays,
-            gbuffer.depth,
-            gbuffer.prim_id,
-            gbuffer.camera.pixel_from_world,
-            np.array(gbuffer.camera.eye),
-            gbuffer.camera.near,
-            mode.thickness_in(gbuffer.scene),
-            mode.stride,
-            float(mode.jitter),
-            max_steps,
-            *marched.rows,
+@register
+@dataclass(frozen=True)
+class PixelDDA(Technique):
+    """Walk along the ray's line on the screen, "dda", pixel by pixel or every `stride` pixels.
+
+    Samples lie `stride` pixels apart along the line's longer axis, so that no pixel is read twice
+    and, at a stride of 1, the pixels read are contiguous. Each stands for the stretch of the ray
+    from half a stride before it to half a stride behind it; if the depths of that stretch meet the
+    slab from the pixel's surface to `thickness` behind it, the pixel is hit.
+
+    Attributes
+    ----------
+    thickness : float or Share
+        Thickness of the surface seen in a pixel, along z_view, world units or a share of the
+        scene's diagonal, > 0.
+    stride : int
+        Pixels from sample to sample, >= 1.
+    jitter : float
+        How far all samples are moved along the ray, in strides, 0 to 1. One number for all rays:
+        the paper's may differ from pixel to pixel, which hides banding in a picture.
+    max_steps : int, optional
+        Samples after which the ray is exhausted, >= 1. By default W + H + 2, which no ray can use
+        up.
+
+    References
+    ----------
+    M. McGuire and M. Mara, "Efficient GPU Screen-Space Ray Tracing", Journal of Computer Graphics
+    Techniques 3(4), 2014, pp. 73-85.
+    """
+
+    name = "dda"
+    description = "Every pixel, or every few, along the ray's line on the screen, and a thickness"
+    reference = "McGuire and Mara 2014"
+
+    thickness: float | Share = DEFAULT_THICKNESS
+    stride: int = 1
+    jitter: float = 0.0
+    max_steps: int | None = None
+
+    def __post_init__(self) -> None:
+        stepping.checked_thickness(self.thickness)
+        _check.integer("stride", self.stride, least=1, most=2**15)
+        _check.fraction("jitter", self.jitter)
+        stepping.checked_steps(self.max_steps)
+
+    @classmethod
+    def _grid(cls, which: str) -> list[Point]:
+        grid = [cls(share, stride) for stride in (1, 4, 16) for share in THICKNESSES]
+        return [
+            Point(f"thickness {each.thickness}, stride {each.stride}", each)
+            for each in (grid if which == "all" else [cls()])
+        ]
+
+    def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
+        camera = screen.camera
+        numbers = PixelDDANumbers(
+            stepping.length_in(screen.scene, self.thickness) / camera.near,
+            int(self.stride),
+            float(self.jitter),
+            int(self.max_steps or camera.width + camera.height + 2),
         )
-    # Every sample is of the depth buffer itself.
-    steps_by_level = np.zeros(len(pyramid), np.int64)
-    steps_by_level[0] = marched.steps.sum(dtype=np.int64)
-    return replace(marched, steps_by_level=steps_by_level)
+        return stepping.march(rays, screen, (), 1, numbers, threads)

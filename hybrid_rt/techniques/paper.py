@@ -2,44 +2,59 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass
 
-import numpy as np
-
-from hybrid_rt import _threads
-from hybrid_rt.kernels.techniques import paper as kernels
+from hybrid_rt.base import Point, Screen, register
+from hybrid_rt.kernels.techniques.paper import PaperNumbers
 from hybrid_rt.raster.gbuffer import GBuffer
-from hybrid_rt.raster.pyramid import DepthPyramid
+from hybrid_rt.raster.pyramid import DepthPyramid, build_depth_pyramid
+from hybrid_rt.rays.marched import Marched
 from hybrid_rt.rays.rays import Rays
-from hybrid_rt.techniques.marched import Marched
-from hybrid_rt.techniques.modes import Paper
+from hybrid_rt.techniques import stepping
 
 
-def march(
-    rays: Rays, gbuffer: GBuffer, pyramid: DepthPyramid, mode: Paper, threads: int | None
-) -> Marched:
-    """Return what `Paper` says about each ray; arguments as `hybrid_rt.march` has checked them."""
-    height, width = gbuffer.depth.shape
-    max_steps = 2 * (width + height) + 2 if mode.max_steps is None else mode.max_steps
-    marched = Marched.unfilled(len(rays))
-    with _threads.limited(threads) as workers:
-        steps_by_level = np.zeros((workers, len(pyramid)), np.int64)
-        kernels.march(
-            workers,
-            *rays.arrays,
-            gbuffer.depth,
-            gbuffer.ddx,
-            gbuffer.ddy,
-            gbuffer.prim_id,
-            pyramid.data,
-            pyramid.offsets,
-            pyramid.pitches,
-            gbuffer.camera.pixel_from_world,
-            np.array(gbuffer.camera.eye),
-            gbuffer.camera.near,
-            mode.samples,
-            max_steps,
-            *marched.rows,
-            steps_by_level,
-        )
-    return replace(marched, steps_by_level=steps_by_level.sum(axis=0))
+@register
+@dataclass(frozen=True)
+class Paper(stepping.Sampled):
+    """The strict march of the paper, "paper".
+
+    Nearest depths of cells, one level coarser after free samples, one finer after a blocked one;
+    where a pixel blocks the ray, that pixel's tilted plane and then the previous pixel's decide; if
+    neither does, the ray is unresolved. No thickness, no skipped pixel.
+
+    Attributes
+    ----------
+    samples : int
+        Consecutive samples of one level before the level may rise, >= 1. The paper takes 4.
+    max_steps : int, optional
+        Step budget of a ray. By default 2 (W + H) + 2, which no ray can use up: a blocked sample is
+        paid for by an earlier free one, and a free one moves at least one pixel on.
+
+    References
+    ----------
+    R. M. Pikulsky, "Ray Tracing Algorithm Based on Screen Space Ray Marching", Visnyk VNTU, 2025,
+    no. 2, pp. 132-137, doi:10.31649/1997-9266-2025-179-2-132-137.
+    """
+
+    name = "paper"
+    description = (
+        "The paper's strict march through a nearest-depth pyramid, then Embree for the rest"
+    )
+    reference = "Pikulsky 2025"
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The depth pyramid."""
+        return ("depth pyramid",)
+
+    @classmethod
+    def _grid(cls, which: str) -> list[Point]:
+        return cls._points(1, 2, 4, 8) if which == "all" else cls._points(4)
+
+    def _read(self, gbuffer: GBuffer, threads: int | None) -> DepthPyramid:
+        return build_depth_pyramid(gbuffer, threads=threads)
+
+    def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
+        numbers = PaperNumbers(*self._budgets(screen.camera))
+        pyramid = screen.data
+        return stepping.march(rays, screen, pyramid.arrays, len(pyramid), numbers, threads)

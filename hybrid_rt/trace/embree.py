@@ -1,26 +1,23 @@
-"""Trace rays exactly: with Embree, or slowly against all triangles in float64."""
+"""Trace rays with Embree."""
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hybrid_rt import _check, _threads
-from hybrid_rt._arrays import I32, Bool
+from hybrid_rt.base import ANY, NEAREST, register
 from hybrid_rt.errors import ArgumentError
-from hybrid_rt.kernels.trace import brute as kernels
+from hybrid_rt.kernels.arrays import I32, Bool
 from hybrid_rt.rays.hits import Hits
 from hybrid_rt.rays.rays import Rays
 from hybrid_rt.scene.mesh import Scene
 from hybrid_rt.trace.embreex import EmbreexScene
-from hybrid_rt.trace.native import QUALITIES, WIDTHS, NativeScene, embree_info, packet_available
-
-__all__ = ["BruteForceTracer", "EmbreeTracer", "embree_info", "packet_available"]
+from hybrid_rt.trace.native import QUALITIES, WIDTHS, NativeScene
+from hybrid_rt.trace.rows import checked_rays, checked_some, rows_at, writable_hits
 
 PATHS = ("packet", "run")
 ORDERS = ("given", "direction")
@@ -30,6 +27,7 @@ ORDERS = ("given", "direction")
 SMALLEST_SCENE, LARGEST_SCENE = 2.0**-40, 2.0**40
 
 
+@register
 class EmbreeTracer:
     """Nearest hits by Embree.
 
@@ -61,7 +59,7 @@ class EmbreeTracer:
         An option that is not one of those above; a scene so large or so small (beyond 2**40 or
         2**-40) that Embree's arithmetic overflows or underflows.
     EmbreeError
-        Path "packet" where the library cannot be reached (see `packet_available`), or an error that
+        Path "packet" where the library cannot be reached (see `embree_problem`), or an error that
         Embree reports.
 
     Notes
@@ -80,6 +78,10 @@ class EmbreeTracer:
     nearly all when t_near is a distance proven free, are exact.
     """
 
+    name = "embree"
+    description = "Embree's BVH, in packets of 1, 4, 8 or 16 rays"
+    queries = frozenset({NEAREST, ANY})
+
     def __init__(
         self,
         scene: Scene,
@@ -94,7 +96,7 @@ class EmbreeTracer:
     ) -> None:
         _check.instance("scene", scene, Scene)
         _check.choice("build_quality", build_quality, QUALITIES)
-        _check.choice("robust", robust, (True, False))
+        robust = _check.boolean("robust", robust)
         largest = float(np.abs(scene.vertices).max())
         if largest != 0 and not SMALLEST_SCENE <= largest <= LARGEST_SCENE:
             raise ArgumentError(
@@ -102,7 +104,7 @@ class EmbreeTracer:
                 f"a largest coordinate from {SMALLEST_SCENE:g} to {LARGEST_SCENE:g}",
                 f"{largest:g}",
             )
-        self._bvh = _Bvh(scene, _threads.count(threads), bool(robust), build_quality)
+        self._bvh = _Bvh(scene, _threads.count(threads), robust, build_quality)
         self._set_path(path, width, coherent, order, threads)
 
     def with_path(
@@ -136,8 +138,9 @@ class EmbreeTracer:
         _threads.count(threads)
         self._threads = threads
         self._path = str(_check.choice("path", path, PATHS))
-        self._width = int(_check.choice("width", width, WIDTHS))
-        self._coherent = bool(_check.choice("coherent", coherent, (True, False)))
+        self._width = _check.integer("width", width, least=1, most=max(WIDTHS))
+        _check.choice("width", self._width, WIDTHS)
+        self._coherent = _check.boolean("coherent", coherent)
         self._order = str(_check.choice("order", order, ORDERS))
         self._bvh.build(self._path)
 
@@ -198,7 +201,7 @@ class EmbreeTracer:
         -------
         Hits
         """
-        rays = _checked(rays)
+        checked_rays(rays, self.scene)
         hits = Hits.unfilled(len(rays))
         self._intersect(rays, hits, None)
         return hits
@@ -222,24 +225,24 @@ class EmbreeTracer:
             Which rays to trace, each from 0 to N - 1, in any order. Neighbours share a packet, so
             rays that go alike should be neighbours. Default: all.
         t_near : (N,) array_like of float32, optional
-            What stands in for ``rays.t_near``; only the values at `indices` are looked at.
+            What stands in for ``rays.t_near``, >= 0; only the values at `indices` are looked at.
 
         Raises
         ------
         ArgumentError
             Arrays of another shape or dtype, `hits` that cannot be written in place, an index that
-            no ray has.
+            no ray has, a `t_near` that is negative or NaN.
 
         Notes
         -----
         The rows written are those of ``intersect(rays.take(indices))``, bit for bit.
         """
-        rays, places = _checked_some(rays, indices, t_near)
-        self._intersect(rays, _checked_hits(hits, len(rays)), places)
+        rays, places = checked_some(rays, self.scene, indices, t_near)
+        self._intersect(rays, writable_hits(hits, len(rays)), places)
 
     def occluded(self, rays: Rays) -> Bool:
         """Return, as (N,) bool, whether each ray hits anything between its t_near and t_far."""
-        rays = _checked(rays)
+        checked_rays(rays, self.scene)
         hit = np.empty(len(rays), np.bool_)
         self._occluded(rays, hit, None)
         return hit
@@ -251,13 +254,13 @@ class EmbreeTracer:
 
         All else is as in `intersect_into`.
         """
-        rays, places = _checked_some(rays, indices, t_near)
+        rays, places = checked_some(rays, self.scene, indices, t_near)
         _check.writable("occluded", occluded, (len(rays),), np.bool_)
         self._occluded(rays, occluded, places)
 
     def _intersect(self, rays: Rays, hits: Hits, indices: I32 | None) -> None:
         if self._path == "run":
-            rows = _rows(indices)
+            rows = rows_at(indices)
             hits.put(rows, self._bvh.embreex.intersect(rays.take(rows), self.threads))
             return
         with _threads.limited(self.threads) as workers:
@@ -268,7 +271,7 @@ class EmbreeTracer:
 
     def _occluded(self, rays: Rays, hit: Bool, indices: I32 | None) -> None:
         if self._path == "run":
-            rows = _rows(indices)
+            rows = rows_at(indices)
             hit[rows] = self._bvh.embreex.occluded(rays.take(rows), self.threads)
             return
         with _threads.limited(self.threads) as workers:
@@ -276,73 +279,6 @@ class EmbreeTracer:
                 rays, hit, indices, width=self._width, coherent=self._coherent,
                 by_direction=self._order == "direction", workers=workers,
             )  # fmt: skip
-
-
-class BruteForceTracer:
-    """Nearest hits by testing every triangle in float64: the slow truth.
-
-    Parameters
-    ----------
-    scene : Scene
-    threads : int, optional
-        Default: as many as `numba.get_num_threads` says at each call.
-
-    Notes
-    -----
-    Rays and vertices are float32 and taken as exact; see `hybrid_rt.kernels.triangle` for the test
-    and its error. Edges are closed, so a ray through a shared edge hits both triangles. Of equal t
-    the smallest prim_id is taken. Triangles of exactly zero area are never hit. A ray with a NaN,
-    an infinity or a zero direction hits nothing. t is rounded to float32 at the very end.
-    """
-
-    def __init__(self, scene: Scene, *, threads: int | None = None) -> None:
-        _check.instance("scene", scene, Scene)
-        _threads.count(threads)
-        self._scene, self._threads = scene, threads
-        self._vertices, self._faces = _kernel_array(scene.vertices), _kernel_array(scene.faces)
-
-    @property
-    def threads(self) -> int:
-        """Threads that the next call will use."""
-        return _threads.count(self._threads)
-
-    @property
-    def scene(self) -> Scene:
-        """What is traced."""
-        return self._scene
-
-    def intersect(self, rays: Rays) -> Hits:
-        """Return the nearest hit of each ray."""
-        rays = _checked(rays)
-        hits = Hits.empty(len(rays))
-        with _threads.limited(self.threads):
-            kernels.nearest(
-                rays.origin, rays.direction, rays.t_near, rays.t_far,
-                self._vertices, self._faces,
-                hits.t, hits.prim_id, hits.u, hits.v, hits.n_g,
-            )  # fmt: skip
-        return hits
-
-    def intersect_into(
-        self, rays: Rays, hits: Hits, indices: Any = None, t_near: Any = None
-    ) -> None:
-        """Write the nearest hits of some rays into their rows, as `EmbreeTracer.intersect_into`."""
-        rays, places = _checked_some(rays, indices, t_near)
-        rows = _rows(places)
-        _checked_hits(hits, len(rays)).put(rows, self.intersect(rays.take(rows)))
-
-    def occluded(self, rays: Rays) -> Bool:
-        """Return, as (N,) bool, whether each ray hits anything between its t_near and t_far."""
-        return np.asarray(self.intersect(rays).prim_id >= 0)
-
-    def occluded_into(
-        self, rays: Rays, occluded: Bool, indices: Any = None, t_near: Any = None
-    ) -> None:
-        """Write whether some rays hit anything, as `EmbreeTracer.occluded_into`."""
-        rays, places = _checked_some(rays, indices, t_near)
-        _check.writable("occluded", occluded, (len(rays),), np.bool_)
-        rows = _rows(places)
-        occluded[rows] = self.occluded(rays.take(rows))
 
 
 class _Bvh:
@@ -367,63 +303,3 @@ class _Bvh:
     @functools.cached_property
     def embreex(self) -> EmbreexScene:
         return EmbreexScene(self.scene, self.robust)
-
-
-def _checked(rays: Rays) -> Rays:
-    """Return rays whose arrays a kernel may have: a length that differs would be read past."""
-    _check.instance("rays", rays, Rays)
-    n = len(rays)
-    arrays = []
-    for name, shape, dtype in (
-        ("origin", ("N", 3), np.float32),
-        ("direction", ("N", 3), np.float32),
-        ("pixel", ("N", 2), np.int32),
-        ("t_near", ("N",), np.float32),
-        ("t_far", ("N",), np.float32),
-    ):
-        value = _check.array(f"rays.{name}", getattr(rays, name), shape, dtype)
-        _check.same_length(f"rays.{name}", value, "rays.origin", n)
-        arrays.append(_kernel_array(value))
-    return Rays(*arrays)
-
-
-def _checked_some(rays: Rays, indices: Any, t_near: Any) -> tuple[Rays, I32 | None]:
-    """Return rays with the t_near that is to be used, and indices that all are in range."""
-    rays = _checked(rays)
-    n = len(rays)
-    if t_near is not None:
-        near = _check.array("t_near", t_near, ("N",), np.float32)
-        _check.same_length("t_near", near, "rays", n)
-        rays = dataclasses.replace(rays, t_near=_kernel_array(near))
-    if indices is None:
-        return rays, None
-    places = _check.array("indices", indices, ("M",), np.int32)
-    if len(places):
-        low, high = int(places.min()), int(places.max())
-        if low < 0 or high >= n:
-            raise ArgumentError("indices", f"values from 0 to {n - 1}", f"values {low} to {high}")
-    return rays, _kernel_array(places)
-
-
-def _checked_hits(hits: Hits, n: int) -> Hits:
-    """Return `hits` if a kernel may write `n` rows there."""
-    _check.instance("hits", hits, Hits)
-    for name, shape, dtype in (
-        ("t", (n,), np.float32),
-        ("prim_id", (n,), np.int32),
-        ("u", (n,), np.float32),
-        ("v", (n,), np.float32),
-        ("n_g", (n, 3), np.float32),
-    ):
-        _check.writable(f"hits.{name}", getattr(hits, name), shape, dtype)
-    return hits
-
-
-def _rows(indices: I32 | None) -> Any:
-    """Return what selects the rows of `indices`, or all of them."""
-    return slice(None) if indices is None else indices
-
-
-def _kernel_array(value: NDArray[Any]) -> NDArray[Any]:
-    # A read-only array has a type of its own in Numba and would compile every kernel again.
-    return np.require(value, requirements=["C", "W"])

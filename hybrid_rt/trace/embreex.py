@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 
-from hybrid_rt._arrays import F32, Bool
+from hybrid_rt.kernels.arrays import F32, Bool
 from hybrid_rt.rays.hits import Hits
 from hybrid_rt.rays.rays import Rays
 from hybrid_rt.scene.mesh import Scene
@@ -39,6 +40,9 @@ class EmbreexScene:
             hits = self.intersect(_scaled(rays, scale), threads)
             with np.errstate(over="ignore"):
                 np.multiply(hits.t, scale, out=hits.t)
+            hit = hits.prim_id >= 0
+            # A t beyond float32 stays finite: infinity would say that there is no hit.
+            np.minimum(hits.t, np.finfo(np.float32).max, out=hits.t, where=hit)
             return hits
         hits = self._from_zero(rays, threads)
         early = np.flatnonzero(hits.t < rays.t_near)
@@ -93,21 +97,25 @@ class EmbreexScene:
         with np.errstate(over="ignore"):
             origin = start.astype(np.float32)
         t_far = rays.t_far - rays.t_near
-        moved = Rays(origin, rays.direction, rays.pixel, np.zeros_like(t_far), t_far)
+        moved = _changed(rays, origin=origin, t_near=np.zeros_like(t_far), t_far=t_far)
         hits = self.intersect(moved, threads)
         np.add(hits.t, rays.t_near, out=hits.t)
         return hits
 
 
+def _changed(rays: Rays, **arrays: Any) -> Rays:
+    """Return rays with other arrays, which this module has just made."""
+    return Rays._made(rays.arrays._replace(**arrays), scene=rays.scene, camera=rays.camera)
+
+
 def _scaled(rays: Rays, scale: F32) -> Rays:
     """Return the same rays with directions multiplied by powers of two."""
     with np.errstate(over="ignore"):
-        return Rays(
-            rays.origin,
-            rays.direction * scale[:, None],
-            rays.pixel,
-            rays.t_near / scale,
-            rays.t_far / scale,
+        return _changed(
+            rays,
+            direction=rays.direction * scale[:, None],
+            t_near=rays.t_near / scale,
+            t_far=rays.t_far / scale,
         )
 
 

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hybrid_rt._arrays import F32, I32, Bool
 from hybrid_rt.errors import EmbreeError
+from hybrid_rt.kernels.arrays import F32, I32, Bool
 from hybrid_rt.kernels.trace import embree as kernels
 from hybrid_rt.rays.hits import Hits
 from hybrid_rt.rays.rays import Rays
@@ -67,8 +67,8 @@ _SIGNATURES: dict[str, tuple[object, list[object]]] = {
 }
 
 
-def packet_available() -> str | None:
-    """Return None where `path="packet"` works, and otherwise the reason why it does not."""
+def embree_problem() -> str | None:
+    """Return why ``path="packet"`` cannot be used, None where it can."""
     try:
         _library()
     except EmbreeError as error:
@@ -87,7 +87,7 @@ def embree_info() -> dict[str, str]:
         chose for its kernels); "packet" ("available", or the reason why it is not). What cannot be
         found out is "unknown".
     """
-    reason = packet_available()
+    reason = embree_problem()
     if reason is not None:
         keys = ("version", "library", "tasking", "native packets", "isa")
         return dict.fromkeys(keys, "unknown") | {"packet": reason}
@@ -135,7 +135,7 @@ class NativeScene:
         # Embree shares these buffers. It reads 16 bytes at every vertex of 12, hence one row more.
         self._vertices = np.zeros((len(scene.vertices) + 1, 3), np.float32)
         self._vertices[:-1] = scene.vertices
-        self._faces = np.ascontiguousarray(scene.faces, np.uint32)
+        self._faces = scene.faces.astype(np.uint32)
 
         self._scene = handle = lib.rtcNewScene(self._device)
         self._check("rtcNewScene")
@@ -177,8 +177,7 @@ class NativeScene:
         kernels.intersect(
             _address(f"rtcIntersect{width}"), self._scene, arguments.ctypes.data, width, workers,
             indices is not None, _NO_INDICES if indices is None else indices, by_direction,
-            rays.origin, rays.direction, rays.t_near, rays.t_far,
-            *hits.arrays,
+            *_without_pixel(rays), *hits.arrays,
         )  # fmt: skip
         self._check(f"rtcIntersect{width}")
 
@@ -198,8 +197,7 @@ class NativeScene:
         kernels.occluded(
             _address(f"rtcOccluded{width}"), self._scene, arguments.ctypes.data, width, workers,
             indices is not None, _NO_INDICES if indices is None else indices, by_direction,
-            rays.origin, rays.direction, rays.t_near, rays.t_far,
-            hit,
+            *_without_pixel(rays), hit,
         )  # fmt: skip
         self._check(f"rtcOccluded{width}")
 
@@ -210,8 +208,14 @@ class NativeScene:
 def usable(rays: Rays) -> tuple[Bool, F32]:
     """Return which rays may be given to Embree, and the factors that their directions need."""
     valid, scale = np.empty(len(rays), np.bool_), np.empty(len(rays), np.float32)
-    kernels.usable(rays.origin, rays.direction, rays.t_near, rays.t_far, valid, scale)
+    kernels.usable(*_without_pixel(rays), valid, scale)
     return valid, scale
+
+
+def _without_pixel(rays: Rays) -> tuple[F32, F32, F32, F32]:
+    """Return what a tracer reads of rays."""
+    arrays = rays.arrays
+    return arrays.origin, arrays.direction, arrays.t_near, arrays.t_far
 
 
 def _release(lib: ctypes.CDLL, device: int, scene: int, buffers: tuple[F32, ...]) -> None:

@@ -33,8 +33,6 @@ def list_all() -> None:
     for kind in kinds.values():
         for table in kind.listed():
             show_table(table)
-    for name, reason in kinds.broken.items():
-        out.print(f"kind {name} cannot be loaded: {reason}", style="yellow", soft_wrap=True)
     out.print("Thickness is a share of the diagonal of the scene's bounding box.")
 
 
@@ -58,15 +56,15 @@ def _scenes() -> None:
 
 
 def _techniques() -> None:
-    from hybrid_rt_bench.measure.techniques import TECHNIQUES
+    import hybrid_rt as hrt
 
     rows = [
         (
             technique.name,
             Text.assemble(technique.description, "\n", (technique.reference, "dim")),
-            ", ".join(f"{k} {v}" for k, v in technique.parameters.items()),
+            ", ".join(f"{k} {v}" for k, v in technique().words().items()),
         )
-        for technique in TECHNIQUES.values()
+        for technique in hrt.TECHNIQUES.values()
     ]
     _table("Techniques", ("technique", "what it does", "default parameters"), rows)
 

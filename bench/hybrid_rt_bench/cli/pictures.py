@@ -18,6 +18,7 @@ from PIL import Image
 import hybrid_rt as hrt
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt_bench.measure import shade
+from hybrid_rt_bench.measure.loaded import native_path
 from hybrid_rt_bench.report.style import hexadecimal, reduced
 from hybrid_rt_bench.results.files import write_bytes
 
@@ -79,16 +80,15 @@ def render(scene: hrt.Scene, camera: hrt.Camera, what: What, threads: int | None
     status: NDArray[np.uint8] | None = None
     for kind in kinds:
         if kind == "shaded":
-            path: Literal["packet", "run"] = "packet" if hrt.packet_available() is None else "run"
-            tracer = hrt.EmbreeTracer(scene, threads=threads, path=path)
+            tracer = hrt.EmbreeTracer(scene, threads=threads, path=native_path())
             images[kind] = shade.shaded(gbuffer, rays, tracer, samples=16)
         elif kind == "depth":
             images[kind] = depth_image(gbuffer)
         elif kind == "normals":
             images[kind] = normals_image(gbuffer)
         else:
-            pyramid = hrt.build_depth_pyramid(gbuffer, threads=threads)
-            status = hrt.march(rays, gbuffer, pyramid, mode="paper", threads=threads).status
+            screen = hrt.prepare(gbuffer, "paper", threads=threads)
+            status = hrt.march(rays, screen, threads=threads).status
             images[kind] = status_image(gbuffer, rays, status)
     if what == "all":
         return _contact_sheet(scene, images, status)

@@ -29,8 +29,8 @@ from hybrid_rt_bench.judged.columns import (
 )
 from hybrid_rt_bench.measure import shade, strongest
 from hybrid_rt_bench.measure.loaded import LoadedScene
-from hybrid_rt_bench.measure.points import Point, View
 from hybrid_rt_bench.measure.queries import SAMPLED, Query
+from hybrid_rt_bench.measure.screens import Screens
 from hybrid_rt_bench.results import statistics as stats
 from hybrid_rt_bench.results.schema import HYBRID_STAGES
 
@@ -58,7 +58,7 @@ class Cell:
 
     query: Query
     rays: hrt.Rays
-    points: Sequence[Point]
+    points: Sequence[hrt.Point]
     rounds: int
     picture: bool
     selection_rays: int
@@ -77,14 +77,14 @@ class JudgedRecord:
 
 
 def measure_cell(
-    loaded: LoadedScene, view: View, cell: Cell, on_pass: Callable[[], None] = lambda: None
+    loaded: LoadedScene, screens: Screens, cell: Cell, on_pass: Callable[[], None] = lambda: None
 ) -> JudgedRecord:
     """Return verdicts, timings and, where asked for, the picture of one cell.
 
     `on_pass` is called whenever the rays have been through one point.
     """
     reference = cell.query.trace(loaded.reference, cell.rays)
-    judged = _Judged(cell, view, loaded, reference)
+    judged = _Judged(cell, screens, loaded, reference)
     for point in cell.points:
         judged.add(point)
         on_pass()
@@ -101,7 +101,7 @@ def measure_cell(
         if cell.rivals:
             judged.add_embree("default", cell.query.trace(rivals["default"].tracer, cell.rays))
             judged.add_reference()
-        samples = _time(cell, view, choice.best.tracer, rivals, on_pass)
+        samples = _time(cell, screens, choice.best.tracer, rivals, on_pass)
         details |= {
             "embree_path": choice.best.label,
             "embree_ns_per_ray": choice.nanoseconds,
@@ -114,56 +114,57 @@ def measure_cell(
 class _Judged:
     """The verdicts of a cell, point after point."""
 
-    def __init__(self, cell: Cell, view: View, loaded: LoadedScene, reference: Any) -> None:
-        self.cell, self.view, self.reference = cell, view, reference
+    def __init__(self, cell: Cell, screens: Screens, loaded: LoadedScene, reference: Any) -> None:
+        self.cell, self.screens, self.reference = cell, screens, reference
+        self.gbuffer, self.camera = screens.gbuffer, screens.gbuffer.camera
         self.robust, self.truth = loaded.reference, loaded.truth
         self.results: list[dict[str, Any]] = []
         self.verdicts: list[dict[str, Any]] = []
         self.reference_wrong = np.zeros(len(cell.rays), np.bool_)
         self.picture: dict[str, Any] | None = None
         if cell.picture:
-            self.image = shade.reflection(view.gbuffer, cell.rays, reference)
+            self.image = shade.reflection(self.gbuffer, cell.rays, reference)
             self.picture = {"grey": np.round(255 * self.image.mean(axis=2)).astype(np.uint8)}
 
-    def add(self, point: Point) -> None:
+    def add(self, point: hrt.Point) -> None:
         """Judge what a point answers."""
-        cell, screen = self.cell, self.view.screen(point)
-        result = cell.query.hybrid(cell.rays, screen, self.robust, point.mode, self.view.threads)
+        cell, screen = self.cell, self.screens.of(point.technique)
+        result = cell.query.hybrid(cell.rays, screen, self.robust, self.screens.threads)
         claims = cell.query.claims(result)
         marched = result.marched
         judged = cell.query.judge(
-            cell.rays, claims, self.reference, self.view.camera, self.truth, marched.pixel
+            cell.rays, claims, self.reference, self.camera, self.truth, marched.pixel
         )
         self._note(judged)
         row = {
-            **_names(point.technique, point.label, point.default),
+            **_names(point.name, point.label, point.default),
             **_count_columns(judged, marched.resolved),
             "steps": float(marched.steps.sum(dtype=np.int64)),
             "prepare_ms": 1e3 * screen.seconds,
             "prepare_mib": screen.nbytes / 2**20,
-            "lists_mib": 0.0 if screen.lists is None else screen.lists.nbytes / 2**20,
+            "lists_mib": getattr(getattr(screen.data, "lists", None), "nbytes", 0) / 2**20,
             "tests": float(marched.tests),
         }
         if self.picture is not None and point.default:
-            image = shade.reflection(self.view.gbuffer, cell.rays, claims)
+            image = shade.reflection(self.gbuffer, cell.rays, claims)
             row |= image_error.columns(self.image, image)
-            classes = _classes(cell.rays, marched.resolved, judged, self.view.gbuffer)
-            self.picture[f"classes_{point.technique}"] = classes
+            classes = _classes(cell.rays, marched.resolved, judged, self.gbuffer)
+            self.picture[f"classes_{point.name}"] = classes
         self.results.append(row)
         self.verdicts += [
-            {"technique": point.technique, "point": point.label, **counted}
+            {"technique": point.name, "point": point.label, **counted}
             for counted in _by_status(marched, judged)
         ]
 
     def add_embree(self, mode: str, claims: Any) -> None:
         """Judge what Embree answers in one of its modes."""
         judged = self.cell.query.judge(
-            self.cell.rays, claims, self.reference, self.view.camera, self.truth
+            self.cell.rays, claims, self.reference, self.camera, self.truth
         )
         self._note(judged)
         row = _count_columns(judged, np.ones(len(self.cell.rays), np.bool_))
         if self.picture is not None:
-            image = shade.reflection(self.view.gbuffer, self.cell.rays, claims)
+            image = shade.reflection(self.gbuffer, self.cell.rays, claims)
             row |= image_error.columns(self.image, image)
         self.results.append(self._embree_row(mode, row))
 
@@ -171,7 +172,7 @@ class _Judged:
         """Count where the reference itself was found wrong, by any of the points judged before."""
         cell = self.cell
         verdict = cell.query.kinds(
-            cell.rays, self.reference, self.reference_wrong, self.view.camera, self.truth
+            cell.rays, self.reference, self.reference_wrong, self.camera, self.truth
         )
         counts = np.bincount(verdict, minlength=len(hrt.Verdict))
         found = {name: int(counts[hrt.Verdict[name.upper()]]) for name in VERDICTS}
@@ -250,16 +251,16 @@ def _best_of(
 
 def _time(
     cell: Cell,
-    view: View,
+    screens: Screens,
     best: hrt.EmbreeTracer,
     rivals: dict[str, strongest.Candidate],
     on_pass: Callable[[], None],
 ) -> list[dict[str, Any]]:
     """Return the samples of all rounds: seconds of Embree and, beside it, of each point."""
 
-    def hybrid(point: Point) -> dict[str, float]:
-        screen = view.screen(point)
-        result = cell.query.hybrid(cell.rays, screen, best, point.mode, view.threads)
+    def hybrid(point: hrt.Point) -> dict[str, float]:
+        screen = screens.of(point.technique)
+        result = cell.query.hybrid(cell.rays, screen, best, screens.threads)
         stages = {stage: float(result.timings[stage]) for stage in HYBRID_STAGES}
         return {**stages, "hybrid": sum(stages.values())}
 
@@ -269,7 +270,7 @@ def _time(
         return time.perf_counter() - start
 
     runs: list[tuple[str, str, Callable[[], dict[str, float]]]] = [
-        (point.technique, point.label, lambda p=point: hybrid(p))  # type: ignore[misc]
+        (point.name, point.label, lambda p=point: hybrid(p))  # type: ignore[misc]
         for point in cell.points
     ]
     runs += [

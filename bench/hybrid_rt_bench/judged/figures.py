@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 from matplotlib.transforms import Bbox
 
-from hybrid_rt.judge.rate import Rate
+from hybrid_rt.judging.rate import Rate
 from hybrid_rt_bench.judged import tables
 from hybrid_rt_bench.judged.columns import EMBREE, POINT, WRONG
 from hybrid_rt_bench.judged.pooling import Pooled, pareto, pools

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from hybrid_rt.judge.rate import Rate
+from hybrid_rt.judging.rate import Rate
 from hybrid_rt_bench.judged.columns import CELL, POINT
 from hybrid_rt_bench.results import statistics as stats
 

@@ -25,14 +25,16 @@ from hybrid_rt_bench.measure.lifecycle import (
 )
 from hybrid_rt_bench.measure.loaded import LoadedScene, prepare
 from hybrid_rt_bench.measure.plan import PlannedScene, make_plan
-from hybrid_rt_bench.measure.points import Point, View, points_of
 from hybrid_rt_bench.measure.progress import Reporter
 from hybrid_rt_bench.measure.queries import query_of
-from hybrid_rt_bench.measure.techniques import Technique, get_technique
+from hybrid_rt_bench.measure.screens import Screens, points_of
 from hybrid_rt_bench.measure.workloads import Workload, get_workload
 
 PICTURED = "mirror"
 """The workload whose image is looked at: one ray a pixel, the same in every run."""
+
+
+Techniques = dict[str, type[hrt.Technique]]
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class PlannedCell:
     entry: WorkloadEntry
     seed: int
     timed: bool
-    points: tuple[Point, ...]
+    points: tuple[hrt.Point, ...]
     rivals: bool = False
 
     def passes(self, rounds: int) -> int:
@@ -83,7 +85,7 @@ def run_judged(
         See `hybrid_rt_bench.measure.lifecycle.carry_out`.
     """
     workers = env.checked_threads(threads)
-    techniques = {name: get_technique(name) for name in experiment.techniques}
+    techniques = {name: hrt.TECHNIQUES[name] for name in experiment.techniques}
     for entry in experiment.workloads:
         get_workload(entry.name)
     reporter.doing("reading scenes")
@@ -102,8 +104,7 @@ def run_judged(
 
 def plan_cells(
     experiment: JudgedExperiment,
-    techniques: dict[str, Technique],
-    scene: hrt.Scene,
+    techniques: Techniques,
     resolution: Resolution,
     camera: int,
 ) -> list[PlannedCell]:
@@ -112,8 +113,7 @@ def plan_cells(
     Parameters
     ----------
     experiment : JudgedExperiment
-    techniques : dict of Technique
-    scene : Scene
+    techniques : dict of type
     resolution : Resolution
     camera : int
         Its number in the scene.
@@ -129,7 +129,7 @@ def plan_cells(
             complete = timed and (experiment.complete is None or resolution in experiment.complete)
             which: Which = entry.points if timed else "default"
             names = experiment.techniques if complete else experiment.counted
-            found = [points_of(techniques[name], scene, which) for name in names]
+            found = [points_of(techniques[name], which) for name in names]
             if found:
                 points = tuple(point for some in found for point in some)
                 cells.append(PlannedCell(entry, seed, timed, points, complete))
@@ -140,11 +140,10 @@ class _Run:
     """All cells of a run, one after the other."""
 
     def __init__(
-        self, experiment: JudgedExperiment, techniques: dict[str, Technique], session: Session
+        self, experiment: JudgedExperiment, techniques: Techniques, session: Session
     ) -> None:
         self.experiment, self.techniques, self.session = experiment, techniques, session
         self.reporter = session.reporter
-        self.small = hrs.get_scene("cornell").load()
         self.started, self.done, self.total = time.monotonic(), 0.0, 0.0
 
     def measure(self) -> None:
@@ -170,25 +169,25 @@ class _Run:
         camera: str,
         resolution: Resolution,
     ) -> None:
-        cells = plan_cells(self.experiment, self.techniques, loaded.scene, resolution, number)
-        view = self.session.measured(
+        cells = plan_cells(self.experiment, self.techniques, resolution, number)
+        screens = self.session.measured(
             _keys(cell_keys(planned.name, camera, resolution)),
-            lambda: View(
+            lambda: _screens(
                 loaded.scene,
                 planned.spec.camera(camera, resolution.width, resolution.height),
                 self.session.threads,
             ),
             lambda: self._advance(sum(self._cell_work(cell, resolution) for cell in cells)),
         )
-        if view is not None:
+        if screens is not None:
             for cell in cells:
-                self._measure_cell(planned, loaded, view, camera, resolution, cell)
+                self._measure_cell(planned, loaded, screens, camera, resolution, cell)
 
     def _measure_cell(
         self,
         planned: PlannedScene,
         loaded: LoadedScene,
-        view: View,
+        screens: Screens,
         camera: str,
         resolution: Resolution,
         cell: PlannedCell,
@@ -200,7 +199,7 @@ class _Run:
         keys = _keys(cell_keys(planned.name, camera, resolution), workload, cell.seed)
 
         def measure() -> judged_cell.JudgedRecord:
-            rays = workload.make(planned.spec, view.gbuffer, cell.seed)
+            rays = workload.make(planned.spec, screens.gbuffer, cell.seed)
             if len(rays) == 0:
                 raise CellError(f"{name}: no rays, since the camera sees no surface")
             pictured = workload.name == PICTURED and resolution == self.experiment.picture
@@ -214,7 +213,7 @@ class _Run:
                 cell.rivals,
             )
             share = whole / cell.passes(self.experiment.rounds)
-            return judged_cell.measure_cell(loaded, view, asked, lambda: self._advance(share))
+            return judged_cell.measure_cell(loaded, screens, asked, lambda: self._advance(share))
 
         record = self.session.measured(
             keys, measure, lambda: self._advance(whole - (self.done - before))
@@ -231,12 +230,11 @@ class _Run:
 
     def _work(self, planned: PlannedScene) -> float:
         """Return the millions of rays that go through points for a scene."""
-        # Which scene it is changes lengths, not how many points there are, so none is loaded here.
         return sum(
             self._cell_work(cell, resolution)
             for number in range(len(planned.cameras))
             for resolution in self.experiment.resolutions
-            for cell in plan_cells(self.experiment, self.techniques, self.small, resolution, number)
+            for cell in plan_cells(self.experiment, self.techniques, resolution, number)
         )
 
     def _cell_work(self, cell: PlannedCell, resolution: Resolution) -> float:
@@ -251,6 +249,10 @@ class _Run:
         left = (time.monotonic() - self.started) * (self.total / max(self.done, 1e-9) - 1)
         share = 100 * self.done / self.total
         return f"; {share:.0f} % done, about {left / 60:.0f} min left"
+
+
+def _screens(scene: hrt.Scene, camera: hrt.Camera, threads: int) -> Screens:
+    return Screens(hrt.rasterize(scene, camera, threads=threads), threads)
 
 
 def _keys(view: dict[str, Any], workload: Workload | None = None, seed: int = 0) -> dict[str, Any]:
@@ -270,7 +272,7 @@ def _said(results: list[dict[str, Any]], cell: PlannedCell) -> str:
 
 
 def stages_to_compile(
-    experiment: JudgedExperiment, techniques: dict[str, Technique], threads: int
+    experiment: JudgedExperiment, techniques: Techniques, threads: int
 ) -> compiling.Stages:
     """Return what is to be compiled: each technique, then each workload through all of them."""
     spec = hrs.get_scene("cornell")
@@ -280,16 +282,12 @@ def stages_to_compile(
     def cell(entry: WorkloadEntry, names: Sequence[str]) -> Callable[[], Any]:
         def measure() -> None:
             workload = get_workload(entry.name)
-            view = View(loaded.scene, camera, threads)
-            points = [
-                point
-                for name in names
-                for point in points_of(techniques[name], loaded.scene, entry.points)
-            ]
-            rays = workload.make(spec, view.gbuffer, 0)
+            screens = _screens(loaded.scene, camera, threads)
+            points = [p for name in names for p in points_of(techniques[name], entry.points)]
+            rays = workload.make(spec, screens.gbuffer, 0)
             pictured = workload.name == PICTURED
             asked = judged_cell.Cell(query_of(workload), rays, points, 1, pictured, 1024)
-            judged_cell.measure_cell(loaded, view, asked)
+            judged_cell.measure_cell(loaded, screens, asked)
 
         return measure
 

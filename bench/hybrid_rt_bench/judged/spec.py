@@ -19,7 +19,7 @@ from hybrid_rt_bench.measure.experiment import (
 )
 
 Which = Literal["all", "default", "switches", "cheapest"]
-"""Which points of a technique are measured; see `hybrid_rt_bench.measure.points.points_of`."""
+"""Which points of a technique are measured; see `hybrid_rt_bench.measure.screens.points_of`."""
 
 
 class WorkloadEntry(BaseModel):
@@ -30,7 +30,7 @@ class WorkloadEntry(BaseModel):
     name : str
         Registered in `hybrid_rt_bench.measure.workloads`.
     points : {"all", "default", "switches", "cheapest"}
-        Which parameters of each technique are measured; see `measure.points.points_of`.
+        Which parameters of each technique are measured; see `measure.screens.points_of`.
     cameras : int, optional
         Time only the first so many cameras of each scene; the others are counted. Default: all.
     seeds : int

@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from hybrid_rt.judge.rate import Rate
+from hybrid_rt.judging.rate import Rate
 from hybrid_rt_bench.judged.columns import CELL, EMBREE, POINT, STRICT, WRONG
 from hybrid_rt_bench.judged.pooling import Pooled, pools
 from hybrid_rt_bench.report.table import Table, interval, number

@@ -36,7 +36,7 @@ def describe(threads: int) -> dict[str, Any]:
         "threads": threads,
         "threading_layer": threading_layer(),
         "embree": hrt.embree_info(),
-        "packet_path": hrt.packet_available() or "available",
+        "packet_path": hrt.embree_problem() or "available",
         "git": git_commit(),
         "load_average": load_average(),
     }

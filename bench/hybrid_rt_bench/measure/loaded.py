@@ -46,4 +46,4 @@ def prepare(scene: hrt.Scene, threads: int) -> LoadedScene:
 
 def native_path() -> Literal["packet", "run"]:
     """Return the path through Embree that copies nothing, if this machine has it."""
-    return "packet" if hrt.packet_available() is None else "run"
+    return "packet" if hrt.embree_problem() is None else "run"

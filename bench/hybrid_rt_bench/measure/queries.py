@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hybrid_rt as hrt
-from hybrid_rt_bench.measure.points import Screen
 from hybrid_rt_bench.measure.workloads import Workload
 
 Flags = NDArray[np.bool_]
@@ -26,7 +25,7 @@ class Query(Protocol):
         ...
 
     def hybrid(
-        self, rays: hrt.Rays, screen: Screen, tracer: hrt.EmbreeTracer, mode: hrt.Mode, threads: int
+        self, rays: hrt.Rays, screen: hrt.Screen, tracer: hrt.EmbreeTracer, threads: int
     ) -> Any:
         """Return what the hybrid says: its answers, with ``marched`` and ``timings``."""
         ...
@@ -62,12 +61,10 @@ class NearestHit:
         return tracer.intersect(rays)
 
     def hybrid(
-        self, rays: hrt.Rays, screen: Screen, tracer: hrt.EmbreeTracer, mode: hrt.Mode, threads: int
+        self, rays: hrt.Rays, screen: hrt.Screen, tracer: hrt.EmbreeTracer, threads: int
     ) -> hrt.HybridResult:
         """Return the result of `hybrid_rt.trace_hybrid`."""
-        return hrt.trace_hybrid(
-            rays, screen.gbuffer, screen.pyramid, tracer, mode=mode, threads=threads
-        )
+        return hrt.trace_hybrid(rays, screen, tracer, threads=threads)
 
     def claims(self, result: hrt.HybridResult) -> hrt.Hits:
         """Return the hybrid's hits."""
@@ -82,7 +79,7 @@ class NearestHit:
         truth: hrt.Truth,
         pixel: Any = None,
     ) -> hrt.Judged:
-        """Return the verdicts of `hybrid_rt.judge`, as if all rays were resolved.
+        """Return the verdicts of `hybrid_rt.judging`, as if all rays were resolved.
 
         Answers that agree with the reference are correct; of these only every `SAMPLED`-th has its
         errors computed, which is most of a judge's work.
@@ -103,7 +100,7 @@ class NearestHit:
         camera: hrt.Camera,
         truth: hrt.Truth,
     ) -> NDArray[np.uint8]:
-        """Return the verdicts of `hybrid_rt.judge` on those rays, UNRESOLVED for the others."""
+        """Return the verdicts of `hybrid_rt.judging` on those rays, UNRESOLVED for the others."""
         return hrt.judge(
             rays, reference, wrong, reference, truth.scene, camera, truth=truth, every=True
         ).verdict
@@ -117,12 +114,10 @@ class AnyHit:
         return tracer.occluded(rays)
 
     def hybrid(
-        self, rays: hrt.Rays, screen: Screen, tracer: hrt.EmbreeTracer, mode: hrt.Mode, threads: int
+        self, rays: hrt.Rays, screen: hrt.Screen, tracer: hrt.EmbreeTracer, threads: int
     ) -> hrt.OcclusionResult:
         """Return the result of `hybrid_rt.occluded_hybrid`."""
-        return hrt.occluded_hybrid(
-            rays, screen.gbuffer, screen.pyramid, tracer, mode=mode, threads=threads
-        )
+        return hrt.occluded_hybrid(rays, screen, tracer, threads=threads)
 
     def claims(self, result: hrt.OcclusionResult) -> Flags:
         """Return which rays the hybrid says are occluded."""

@@ -66,7 +66,7 @@ def candidates(robust: hrt.EmbreeTracer, default: hrt.EmbreeTracer) -> list[Cand
     found = []
     for mode, tracer in (("robust", robust), ("default", default)):
         found.append(Candidate(f"run, {mode}", tracer.with_path(path="run")))
-        if hrt.packet_available() is not None:
+        if hrt.embree_problem() is not None:
             continue
         for width in WIDTHS:
             for words, least, coherent, order in WAYS:

@@ -1,8 +1,8 @@
 """Which tiles a triangle may touch: boxes of vertices, boxes of triangles, bins of tiles.
 
 A vertex's *box* are the pixels whose grown squares may hold its projection: its coordinates with
-their error bounds (see `kernels.raster.lists`) and the margin, rounded outwards. The box of a
-triangle wholly in front of the near plane is the least that holds those of its vertices.
+their error bounds (see `kernels.raster.lists_planes`) and the margin, rounded outwards. The box of
+a triangle wholly in front of the near plane is the least that holds those of its vertices.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from hybrid_rt.kernels.raster._order import entry
 from hybrid_rt.kernels.raster.bins import TILE_BITS
 
 SLACK = 2.0**-48
-"""Relative error of sums of three products, 32 e; see `kernels.raster.lists`."""
+"""Relative error of sums of three products, 32 e; see `kernels.raster.lists_planes`."""
 NEAR_SLACK = 2.0**-20
 """The near plane is moved to the eye by this, relative: a ray may end a rounding beyond it."""
 

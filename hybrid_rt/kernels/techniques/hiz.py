@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numba import prange
+from typing import NamedTuple
 
-from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
-from hybrid_rt.kernels._queue import fetch_add
+import numpy as np
+
+from hybrid_rt.kernels._jit import inlined
+from hybrid_rt.kernels.techniques.driver import marches
 from hybrid_rt.kernels.techniques.screen import (
-    CHUNK,
     EXHAUSTED,
     F0,
     F1,
@@ -21,8 +21,6 @@ from hybrid_rt.kernels.techniques.screen import (
     clamp,
     edge_s,
     next_cell,
-    screen_ray,
-    write_row,
 )
 
 
@@ -35,11 +33,11 @@ def within_cell(place, coarse, level, now, step):
 
 
 @inlined
-def march_ray(
+def stop_of(
     status, x, y, z0, dx, dy, dz, s_end, own_x, own_y, width, height,
     cells, offsets, pitches, max_steps, steps_by_level,
 ):  # fmt: skip
-    """March one ray; return (status, pixel x, pixel y, s, samples) of where it stops.
+    """Return (status, pixel x, pixel y, s, samples) of where a ray stops.
 
     HIT means that it stopped at, or behind, the depth of that pixel.
     """
@@ -131,68 +129,38 @@ def confidence(i, j, s, depth, ddx, ddy, x0, y0, z0, dx, dy, dz, near, thickness
     return (F1 - smoothstep(apart / thickness)) * vignette
 
 
-@kernel
-def march_chunk(
-    first, last, origin, direction, ray_pixel, t_near, t_far, depth, ddx, ddy, prim_id,
-    cells, offsets, pitches, m, eye, near,
-    thickness, threshold, border, exhausted_hits, trace_background, max_steps,
-    status, resolved, pixel, prim, t, t_free, steps, steps_by_level,
-):  # fmt: skip
-    """Set up rays in float64, march them in float32 and write their rows of the outputs."""
+class HiZNumbers(NamedTuple):
+    """Parameters of `hybrid_rt.HiZ`; `thickness` in world units, and the near plane's distance."""
+
+    thickness: float
+    near: float
+    threshold: float
+    border: float
+    exhausted_hits: bool
+    trace_background: bool
+    max_steps: int
+
+
+@marches(HiZNumbers)
+def hiz_ray(numbers, buffers, pyramid, ray, own_x, own_y, steps_by_level):
+    """March one ray, as `driver.march_ray`."""
+    depth, ddx, ddy, _ = buffers
     height, width = depth.shape
-    margin = np.float32(border * height)
-    for i in range(first, last):
-        end, x, y, depth0, dx, dy, dz, s_end, z, gz = screen_ray(
-            np.float64(origin[i, 0]), np.float64(origin[i, 1]), np.float64(origin[i, 2]),
-            np.float64(direction[i, 0]), np.float64(direction[i, 1]), np.float64(direction[i, 2]),
-            np.float64(t_near[i]), np.float64(t_far[i]), m, eye, near, width, height,
-        )  # fmt: skip
-        how, at_x, at_y, s, count = end, -1, -1, F0, 0
-        hit_x, hit_y = -1, -1
-        answers = False
-        if s_end >= 0.0:
-            x0, y0, z0 = np.float32(x), np.float32(y), np.float32(depth0)
-            ex, ey, ez = np.float32(dx), np.float32(dy), np.float32(dz)
-            how, at_x, at_y, s, count = march_ray(
-                end, x0, y0, z0, ex, ey, ez, np.float32(s_end),
-                ray_pixel[i, 0], ray_pixel[i, 1], width, height,
-                cells, offsets, pitches, max_steps, steps_by_level,
-            )  # fmt: skip
-            judged = how == HIT or (how == EXHAUSTED and exhausted_hits)
-            if (judged or how == MISS) and depth[at_y, at_x] <= F0:
-                answers = not trace_background
-            elif judged:
-                answers = threshold <= confidence(
-                    at_x, at_y, s, depth, ddx, ddy, x0, y0, z0, ex, ey, ez,
-                    np.float32(near), np.float32(thickness), margin,
-                )  # fmt: skip
-                if answers:
-                    hit_x, hit_y = at_x, at_y
-                elif how == HIT:
-                    how = HIDDEN
-        write_row(
-            i, how, answers, hit_x, hit_y, s, s, count, s_end >= 0.0, z, gz,
-            t_near, t_far, prim_id, status, resolved, pixel, prim, t, t_free, steps,
-        )  # fmt: skip
-
-
-@parallel_kernel
-def march(
-    workers, origin, direction, ray_pixel, t_near, t_far, depth, ddx, ddy, prim_id,
-    cells, offsets, pitches, m, eye, near,
-    thickness, threshold, border, exhausted_hits, trace_background, max_steps,
-    status, resolved, pixel, prim, t, t_free, steps, steps_by_level,
-):  # fmt: skip
-    """March rays (N, 3) through a pyramid; outputs (N,), steps_by_level (workers, L) int64."""
-    n = origin.shape[0]
-    taken = np.zeros(1, np.int64)
-    for worker in prange(workers):
-        first = fetch_add(taken.ctypes.data, CHUNK)
-        while first < n:
-            march_chunk(
-                first, min(n, first + CHUNK), origin, direction, ray_pixel, t_near, t_far,
-                depth, ddx, ddy, prim_id, cells, offsets, pitches, m, eye, near,
-                thickness, threshold, border, exhausted_hits, trace_background, max_steps,
-                status, resolved, pixel, prim, t, t_free, steps, steps_by_level[worker],
-            )  # fmt: skip
-            first = fetch_add(taken.ctypes.data, CHUNK)
+    x0, y0, z0 = np.float32(ray.x), np.float32(ray.y), np.float32(ray.depth)
+    dx, dy, dz = np.float32(ray.dx), np.float32(ray.dy), np.float32(ray.dz)
+    how, at_x, at_y, s, count = stop_of(
+        ray.status, x0, y0, z0, dx, dy, dz, np.float32(ray.s_end), own_x, own_y, width, height,
+        pyramid.cells, pyramid.offsets, pyramid.pitches, numbers.max_steps, steps_by_level,
+    )  # fmt: skip
+    judged = how == HIT or (how == EXHAUSTED and numbers.exhausted_hits)
+    if (judged or how == MISS) and depth[at_y, at_x] <= F0:
+        return how, not numbers.trace_background, -1, -1, s, s, count
+    if not judged:
+        return how, False, -1, -1, s, s, count
+    trust = confidence(
+        at_x, at_y, s, depth, ddx, ddy, x0, y0, z0, dx, dy, dz, np.float32(numbers.near),
+        np.float32(numbers.thickness), np.float32(numbers.border * height),
+    )  # fmt: skip
+    if numbers.threshold <= trust:
+        return how, True, at_x, at_y, s, s, count
+    return (HIDDEN if how == HIT else how), False, -1, -1, s, s, count

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numba import prange
+from typing import NamedTuple
 
-from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
-from hybrid_rt.kernels._queue import fetch_add
+import numpy as np
+
+from hybrid_rt.kernels._jit import kernel
+from hybrid_rt.kernels.techniques.driver import marches
 from hybrid_rt.kernels.techniques.screen import (
-    CHUNK,
     EXHAUSTED,
     F0,
     HALF,
@@ -19,20 +19,20 @@ from hybrid_rt.kernels.techniques.screen import (
     clamp,
     edge_s,
     next_cell,
-    screen_ray,
-    write_row,
 )
 
 
 @kernel
-def tilted_plane_s(
-    i, j, depth, ddx, ddy, x0, y0, z0, dx, dy, dz, inv_x, inv_y, step_x, step_y, s_start, s_end
-):
+def tilted_plane_s(i, j, buffers, line, axes, s_start, s_end):
     """Return the s at which the ray meets the plane of pixel (i, j) inside that pixel, or -1.
 
     The pixel is the plane ``depth + ddx (x - i - 1/2) + ddy (y - j - 1/2)``; the ray must reach it
-    from the observer's side. Paper: "Correct".
+    from the observer's side. `line`: its start and deltas on the screen; `axes`: see `screen.axis`.
+    Paper: "Correct".
     """
+    depth, ddx, ddy, _ = buffers
+    x0, y0, z0, dx, dy, dz = line
+    inv_x, inv_y, step_x, step_y = axes
     centre = depth[j, i]
     if centre <= F0:
         return np.float32(-1.0)
@@ -56,30 +56,21 @@ def tilted_plane_s(
     return first + (last - first) * (in_front / (in_front - behind))
 
 
-@inlined
-def march_ray(
-    status,
-    x,
-    y,
-    z0,
-    dx,
-    dy,
-    dz,
-    s_end,
-    own_x,
-    own_y,
-    depth,
-    ddx,
-    ddy,
-    cells,
-    offsets,
-    pitches,
-    samples,
-    max_steps,
-    steps_by_level,
-):
-    """March one ray; return (status, pixel x, pixel y, s of the hit, s proven free, steps)."""
-    height, width = depth.shape
+class PaperNumbers(NamedTuple):
+    """Parameters of `hybrid_rt.Paper`."""
+
+    samples: int
+    max_steps: int
+
+
+@marches(PaperNumbers)
+def paper_ray(numbers, buffers, pyramid, ray, own_x, own_y, steps_by_level):
+    """March one ray, as `driver.march_ray`."""
+    cells, offsets, pitches = pyramid
+    x, y, z0 = np.float32(ray.x), np.float32(ray.y), np.float32(ray.depth)
+    dx, dy, dz = np.float32(ray.dx), np.float32(ray.dy), np.float32(ray.dz)
+    s_end = np.float32(ray.s_end)
+    height, width = buffers.depth.shape
     top = offsets.shape[0] - 1
     inv_x, bias_x, step_x, far_x = axis(dx)
     inv_y, bias_y, step_y, far_y = axis(dy)
@@ -94,7 +85,7 @@ def march_ray(
     skip = cx == own_x and cy == own_y
     while True:
         blocked = False
-        for _ in range(samples):
+        for _ in range(numbers.samples):
             lx, ly = cx >> level, cy >> level
             edge_x, edge_y = (lx + far_x) << level, (ly + far_y) << level
             sx = edge_s(edge_x, x, inv_x, bias_x)
@@ -103,8 +94,8 @@ def march_ray(
             if skip:
                 skip = False
             else:
-                if steps == max_steps:
-                    return EXHAUSTED, -1, -1, F0, s, steps
+                if steps == numbers.max_steps:
+                    return EXHAUSTED, False, -1, -1, F0, s, steps
                 steps += 1
                 steps_by_level[level] += 1
                 nearest = cells[offsets[level] + ly * pitches[level] + lx]
@@ -115,13 +106,13 @@ def march_ray(
             if s_exit > s:
                 s = s_exit
             if s_exit >= s_end:
-                return status, -1, -1, F0, s_end, steps
+                return ray.status, False, -1, -1, F0, s_end, steps
             from_x = sx < sy
             cx, cy = next_cell(
                 cx, cy, lx, ly, level, edge_x, edge_y, sx, sy, s, x, y, dx, dy, step_x, step_y
             )
             if cx < 0 or cy < 0 or cx >= width or cy >= height:
-                return OFFSCREEN, -1, -1, F0, s, steps
+                return OFFSCREEN, False, -1, -1, F0, s, steps
         if not blocked:
             if level < top:
                 level += 1
@@ -130,98 +121,16 @@ def march_ray(
         else:
             break
     hit_x, hit_y = cx, cy
-    hit = tilted_plane_s(
-        hit_x,
-        hit_y,
-        depth,
-        ddx,
-        ddy,
-        x,
-        y,
-        z0,
-        dx,
-        dy,
-        dz,
-        inv_x,
-        inv_y,
-        step_x,
-        step_y,
-        F0,
-        s_end,
-    )
+    line = x, y, z0, dx, dy, dz
+    axes = inv_x, inv_y, step_x, step_y
+    hit = tilted_plane_s(hit_x, hit_y, buffers, line, axes, F0, s_end)
     if hit < F0 and s > F0:
         if from_x:
             hit_x -= step_x
         else:
             hit_y -= step_y
         if not (hit_x == own_x and hit_y == own_y):
-            hit = tilted_plane_s(
-                hit_x,
-                hit_y,
-                depth,
-                ddx,
-                ddy,
-                x,
-                y,
-                z0,
-                dx,
-                dy,
-                dz,
-                inv_x,
-                inv_y,
-                step_x,
-                step_y,
-                F0,
-                s_end,
-            )
+            hit = tilted_plane_s(hit_x, hit_y, buffers, line, axes, F0, s_end)
     if hit < F0:
-        return HIDDEN, -1, -1, F0, s, steps
-    return HIT, hit_x, hit_y, hit, min(s, hit), steps
-
-
-@kernel
-def march_chunk(
-    first, last, origin, direction, ray_pixel, t_near, t_far, depth, ddx, ddy, prim_id,
-    cells, offsets, pitches, m, eye, near, samples, max_steps,
-    status, resolved, pixel, prim, t, t_free, steps, steps_by_level,
-):  # fmt: skip
-    """Set up rays in float64, march them in float32 and write their rows of the outputs."""
-    height, width = depth.shape
-    for i in range(first, last):
-        end, x, y, z0, dx, dy, dz, s_end, z, gz = screen_ray(
-            np.float64(origin[i, 0]), np.float64(origin[i, 1]), np.float64(origin[i, 2]),
-            np.float64(direction[i, 0]), np.float64(direction[i, 1]), np.float64(direction[i, 2]),
-            np.float64(t_near[i]), np.float64(t_far[i]), m, eye, near, width, height,
-        )  # fmt: skip
-        how, hit_x, hit_y, s_hit, s_free, count = end, -1, -1, F0, F0, 0
-        if s_end >= 0.0:
-            how, hit_x, hit_y, s_hit, s_free, count = march_ray(
-                end, np.float32(x), np.float32(y), np.float32(z0),
-                np.float32(dx), np.float32(dy), np.float32(dz), np.float32(s_end),
-                ray_pixel[i, 0], ray_pixel[i, 1], depth, ddx, ddy,
-                cells, offsets, pitches, samples, max_steps, steps_by_level,
-            )  # fmt: skip
-        write_row(
-            i, how, how == HIT, hit_x, hit_y, s_hit, s_free, count, s_end >= 0.0, z, gz,
-            t_near, t_far, prim_id, status, resolved, pixel, prim, t, t_free, steps,
-        )  # fmt: skip
-
-
-@parallel_kernel
-def march(
-    workers, origin, direction, ray_pixel, t_near, t_far, depth, ddx, ddy, prim_id,
-    cells, offsets, pitches, m, eye, near, samples, max_steps,
-    status, resolved, pixel, prim, t, t_free, steps, steps_by_level,
-):  # fmt: skip
-    """March rays (N, 3) through a pyramid; outputs (N,), steps_by_level (workers, L) int64."""
-    n = origin.shape[0]
-    taken = np.zeros(1, np.int64)
-    for worker in prange(workers):
-        first = fetch_add(taken.ctypes.data, CHUNK)
-        while first < n:
-            march_chunk(
-                first, min(n, first + CHUNK), origin, direction, ray_pixel, t_near, t_far,
-                depth, ddx, ddy, prim_id, cells, offsets, pitches, m, eye, near, samples, max_steps,
-                status, resolved, pixel, prim, t, t_free, steps, steps_by_level[worker],
-            )  # fmt: skip
-            first = fetch_add(taken.ctypes.data, CHUNK)
+        return HIDDEN, False, -1, -1, F0, s, steps
+    return HIT, True, hit_x, hit_y, hit, min(s, hit), steps

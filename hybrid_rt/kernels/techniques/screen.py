@@ -6,17 +6,20 @@ On the screen a ray is ``(x, y, depth)(s) = start + s * delta`` with
     x(s) = x + s (qd_x - x qd_z),   depth(s) = depth (1 - s qd_z),   t - t_near = s z / (1 - s qd_z)
 
 which needs no end point and stays finite as t goes to infinity (s = 1 / qd_z, depth = 0).
+
+Directions are scaled by a power of two first, so that their length plays no part in float32.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from hybrid_rt.kernels._jit import inlined
 
-# types.MarchStatus
+# rays.marched.MarchStatus
 HIT, MISS, OFFSCREEN, HIDDEN, NEAR, EXHAUSTED, INVALID, UNDECIDED, SKIPPED = range(9)
 
 CHUNK = 1024  # rays that a thread takes at a time
@@ -25,10 +28,51 @@ F0 = np.float32(0.0)
 F1 = np.float32(1.0)
 HALF = np.float32(0.5)
 INF = np.float32(np.inf)
+LARGEST_T = float(np.finfo(np.float32).max)
+"""A hit whose t float32 cannot hold is given this one: infinity would say that there is none."""
+
+
+class ScreenRay(NamedTuple):
+    """A ray on the screen, float64; see `place`. `length` is that of its direction."""
+
+    status: int
+    x: float
+    y: float
+    depth: float
+    dx: float
+    dy: float
+    dz: float
+    s_end: float
+    z: float
+    gz: float
+    length: float
 
 
 @inlined
-def screen_ray(ox, oy, oz, dx, dy, dz, t_near, t_far, m, eye, near, width, height):
+def scale_of(dx, dy, dz):
+    """Return the power of two that brings a direction's largest component to [1/2, 1)."""
+    largest = max(abs(dx), abs(dy), abs(dz))
+    if not (largest > 0.0 and largest < math.inf):
+        return 1.0
+    return math.ldexp(1.0, -math.frexp(largest)[1])
+
+
+@inlined
+def screen_ray(i, rays, view, width, height):
+    """Return ray i on the screen, and by what its direction was multiplied before."""
+    ox, oy, oz = rays.origin[i, 0], rays.origin[i, 1], rays.origin[i, 2]
+    dx, dy, dz = rays.direction[i, 0], rays.direction[i, 1], rays.direction[i, 2]
+    scale = scale_of(np.float64(dx), np.float64(dy), np.float64(dz))
+    placed = place(
+        np.float64(ox), np.float64(oy), np.float64(oz), dx * scale, dy * scale, dz * scale,
+        rays.t_near[i] / scale, rays.t_far[i] / scale, view.m, view.eye, view.near, width, height,
+    )  # fmt: skip
+    length = math.sqrt((dx * scale) ** 2 + (dy * scale) ** 2 + (dz * scale) ** 2)
+    return ScreenRay(*placed, length), scale
+
+
+@inlined
+def place(ox, oy, oz, dx, dy, dz, t_near, t_far, m, eye, near, width, height):
     """Return (status, x, y, depth, delta x, y, depth, s_end, z, qd_z); paper: "Initialise".
 
     `status` is how the ray ends if it meets nothing before `s_end`, the largest s inside the view
@@ -144,23 +188,24 @@ def slab_bottom(depth, thickness):
 
 
 @inlined
-def write_row(
-    i, how, answers, hit_x, hit_y, s_hit, s_free, count, started, z, gz, t_near, t_far, prim_id,
-    status, resolved, pixel, prim, t, t_free, steps,
-):  # fmt: skip
-    """Write row i of a march's outputs; hit_x is -1 where no pixel answers the ray with a hit."""
-    start = np.float64(t_near[i])
-    status[i] = how
-    resolved[i] = answers
-    pixel[i, 0] = hit_x
-    pixel[i, 1] = hit_y
-    steps[i] = count
-    t_free[i] = t_far[i] if how == MISS else ray_t(np.float64(s_free), z, gz, start)
-    if not started:
-        t_free[i] = 0.0
-    if hit_x >= 0:
-        prim[i] = prim_id[hit_y, hit_x]
-        t[i] = ray_t(np.float64(s_hit), z, gz, start)
+def write_row(i, row, ray, scale, rays, prim_ids, out):
+    """Write row i of a march's outputs; `row` is what `driver.march_ray` returns."""
+    how, answers, hit_x, hit_y, s_hit, s_free, count = row
+    start = rays.t_near[i] / scale
+    out.status[i] = how
+    out.resolved[i] = answers
+    out.pixel[i, 0] = hit_x
+    out.pixel[i, 1] = hit_y
+    out.steps[i] = count
+    if ray.s_end < 0.0:
+        out.t_free[i] = 0.0
+    elif how == MISS:
+        out.t_free[i] = rays.t_far[i]
     else:
-        prim[i] = -1
-        t[i] = np.inf
+        out.t_free[i] = ray_t(np.float64(s_free), ray.z, ray.gz, start) * scale
+    if hit_x >= 0:
+        out.prim_id[i] = prim_ids[hit_y, hit_x]
+        out.t[i] = min(ray_t(np.float64(s_hit), ray.z, ray.gz, start) * scale, LARGEST_T)
+    else:
+        out.prim_id[i] = -1
+        out.t[i] = np.inf

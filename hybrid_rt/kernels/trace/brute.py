@@ -10,6 +10,8 @@ from numba import prange
 from hybrid_rt.kernels._jit import inlined, parallel_kernel
 from hybrid_rt.kernels.triangle import frame, intersect, normal
 
+LARGEST = float(np.finfo(np.float32).max)
+
 
 @inlined
 def _nearest_of_all(o, d, near, far, vertices, faces):
@@ -49,5 +51,6 @@ def nearest(
             )
         if best >= 0:
             gx, gy, gz = normal(vertices, faces[best, 0], faces[best, 1], faces[best, 2])
+            best_t = min(best_t, LARGEST)  # infinity would say that there is no hit
         t[i], prim_id[i], u[i], v[i] = best_t, best, best_u, best_v
         n_g[i, 0], n_g[i, 1], n_g[i, 2] = gx, gy, gz

@@ -235,6 +235,8 @@ def _store_vectors(i, n, packet, words, t, prim_id, u, v, n_g):
     live = simd.first(n)
     hit = simd.load(words, 18 * WIDTH) == 0
     distance = simd.load(packet, 8 * WIDTH) * simd.load(packet, SCALE * WIDTH)
+    # A t beyond float32 stays finite: infinity would say that there is no hit.
+    distance = simd.minimum(distance, LARGEST)
     simd.store_masked(t, i, simd.select(hit, distance, np.inf), live)
     simd.store_masked(prim_id, i, simd.select(hit, simd.load(words, 17 * WIDTH), -1), live)
     simd.store_masked(u, i, simd.select(hit, simd.load(packet, 15 * WIDTH), 0.0), live)
@@ -257,7 +259,8 @@ def _store(first, count, width, in_order, queue, packet, words, t, prim_id, u, v
             break
         i = np.uint64(queue[first + k])
         hit = words[18 * width + k] == 0  # the one geometry of the scene
-        t[i] = packet[8 * width + k] * packet[SCALE * width + k] if hit else np.float32(np.inf)
+        distance = min(packet[8 * width + k] * packet[SCALE * width + k], LARGEST)
+        t[i] = distance if hit else np.float32(np.inf)
         prim_id[i] = words[17 * width + k] if hit else np.int32(-1)
         n_g[i, 0] = packet[12 * width + k] if hit else nothing
         n_g[i, 1] = packet[13 * width + k] if hit else nothing

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 import hybrid_rt as hrt
-from hybrid_rt._arrays import F32
+from hybrid_rt.kernels.arrays import F32
 from hybrid_rt_scenes.hard.truth import Truth, truth
 
 DepthFormat = Literal["float32", "unorm16", "unorm24", "standard_z"]
@@ -53,7 +53,9 @@ class BuiltCase:
     def gbuffer(self) -> hrt.GBuffer:
         """The view, its depth kept in the case's format."""
         drawn = hrt.rasterize(self.scene, self.camera, derivatives=self.derivatives)
-        return replace(drawn, depth=stored(drawn.depth, self.depth_format))
+        depth = stored(drawn.depth, self.depth_format)
+        # What the format rounds to nothing is not seen.
+        return replace(drawn, depth=depth, prim_id=np.where(depth > 0, drawn.prim_id, -1))
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Grade answers to the rays of a hard case.
 
-The words are those of `hybrid_rt.judge.metrics`; the truth is `hybrid_rt_scenes.hard.truth` and no
+The words are those of `hybrid_rt.judging.metrics`; the truth is `hard.truth` and no
 tracer. Of a ray that a technique answers:
 
 ===============  ==================================================================================
@@ -31,7 +31,7 @@ import numpy as np
 
 import hybrid_rt as hrt
 from hybrid_rt import _check
-from hybrid_rt._arrays import F64, Bool
+from hybrid_rt.kernels.arrays import F64, Bool
 from hybrid_rt_scenes.hard.case import BuiltCase
 from hybrid_rt_scenes.hard.truth import Truth
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import hybrid_rt as hrt
-from hybrid_rt._arrays import F32, F64, I32
+from hybrid_rt.kernels.arrays import F32, F64, I32
 from hybrid_rt_scenes.hard.case import BuiltCase
 from hybrid_rt_scenes.primitives import Part, boxes, join, quad
 

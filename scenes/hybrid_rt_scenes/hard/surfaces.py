@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 import hybrid_rt as hrt
-from hybrid_rt._arrays import F64, I64
+from hybrid_rt.kernels.arrays import F64, I64
 from hybrid_rt_scenes.hard.case import BuiltCase, HardCase
 from hybrid_rt_scenes.hard.stage import (
     HEIGHT,

@@ -30,10 +30,10 @@ from typing import Any
 import numpy as np
 
 import hybrid_rt as hrt
-from hybrid_rt._arrays import F64, I32, I64, Bool
+from hybrid_rt.kernels.arrays import F64, I32, I64, Bool
 
 SLACK = 8 * 2.0**-24
-"""Of float32: eight half units in the last place, as in `hybrid_rt.judge.metrics`."""
+"""Of float32: eight half units in the last place, as in `hybrid_rt.judging.metrics`."""
 _DOUBTFUL = 64 * 2.0**-53
 # A sheared corner errs by 5 e r and is at most 2 r large, with e = 2**-53 and r the largest
 # relative coordinate: an edge function, a difference of two products of such, errs by less than

@@ -27,7 +27,7 @@ from hybrid_rt_bench.measure.errors import CellError
 from hybrid_rt_bench.measure.experiment import Resolution
 from hybrid_rt_bench.measure.loaded import LoadedScene, prepare
 from hybrid_rt_bench.measure.primary import primary_rays
-from hybrid_rt_bench.measure.techniques import Technique
+from hybrid_rt_bench.measure.screens import Screens
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ def measure_cell(
     camera: hrt.Camera,
     name: str,
     experiment: PaperExperiment,
-    techniques: list[Technique],
+    techniques: list[hrt.Technique],
     threads: int,
     on_round: Callable[[], None] = lambda: None,
 ) -> CellRecord:
@@ -97,15 +97,13 @@ def measure_cell(
     picture: dict[str, Any] = {}
     if keep_picture:
         picture["shaded"] = shade.shaded(gbuffer, rays, loaded.reference)
-    pyramid = hrt.build_depth_pyramid(gbuffer, threads=threads)
+    screens = Screens(gbuffer, threads)
     reference = loaded.reference.intersect(rays)
     results, verdicts = [], []
     unstable: dict[str, float] = {}
     steps_by_level: dict[str, NDArray[np.int64] | None] = {}
     for technique in techniques:
-        result = hrt.trace_hybrid(
-            rays, gbuffer, pyramid, stages.tracer, mode=technique.mode, threads=threads
-        )
+        result = hrt.trace_hybrid(rays, screens.of(technique), stages.tracer, threads=threads)
         found = quality.judge(rays, gbuffer, result, reference, loaded.truth)
         steps_by_level[technique.name] = result.marched.steps_by_level
         timed = _by_stage(rows, technique.name)
@@ -138,7 +136,7 @@ def measure_cell(
 
 
 def stages_to_compile(
-    experiment: PaperExperiment, techniques: list[Technique], threads: int
+    experiment: PaperExperiment, techniques: list[hrt.Technique], threads: int
 ) -> compiling.Stages:
     """Return what is to be compiled: every stage, on a tiny view."""
     scene = _tiny_scene()
@@ -151,21 +149,15 @@ def stages_to_compile(
     def gbuffer() -> hrt.GBuffer:
         return hrt.rasterize(scene, camera, derivatives=experiment.derivatives, threads=threads)
 
-    def march(technique: Technique) -> Callable[[], Any]:
-        buffer = functools.cache(gbuffer)
+    def march(technique: hrt.Technique) -> Callable[[], Any]:
+        drawn = functools.cache(gbuffer)
         return lambda: hrt.trace_hybrid(
-            hrt.mirror_rays(buffer()),
-            buffer(),
-            hrt.build_depth_pyramid(buffer(), threads=threads),
-            best,
-            mode=technique.mode,
-            threads=threads,
+            hrt.mirror_rays(drawn()), technique.prepare(drawn()), best, threads=threads
         )
 
     return {
         "raster": gbuffer,
         "mirror rays": lambda: hrt.mirror_rays(gbuffer()),
-        "depth pyramid": lambda: hrt.build_depth_pyramid(gbuffer(), threads=threads),
         "Embree": lambda: strongest.choose(loaded.candidates, primary_rays(camera), 1024),
         **{technique.name: march(technique) for technique in techniques},
         "judge and picture": lambda: measure_cell(
@@ -185,7 +177,7 @@ class _Stages:
         primary: hrt.Rays,
         tracer: hrt.EmbreeTracer,
         primary_tracer: hrt.EmbreeTracer,
-        techniques: list[Technique],
+        techniques: list[hrt.Technique],
         threads: int,
         derivatives: Literal["plane", "quad"],
     ) -> None:
@@ -213,21 +205,13 @@ class _Stages:
                 ),
             )
             timed("embree_primary", lambda: self.primary_tracer.intersect(self.primary))
-            pyramid = timed(
-                "pyramid", lambda: hrt.build_depth_pyramid(gbuffer, threads=self.threads)
-            )
             timed("rays", lambda: hrt.mirror_rays(gbuffer))
             if trace_first:
                 timed("embree", lambda: self.tracer.intersect(self.rays))
             for technique in self.techniques:
-                result = hrt.trace_hybrid(
-                    self.rays,
-                    gbuffer,
-                    pyramid,
-                    self.tracer,
-                    mode=technique.mode,
-                    threads=self.threads,
-                )
+                screen = technique.prepare(gbuffer, threads=self.threads)
+                seconds[technique.name, "pyramid"] = screen.seconds
+                result = hrt.trace_hybrid(self.rays, screen, self.tracer, threads=self.threads)
                 for stage, value in result.timings.items():
                     seconds[technique.name, stage] = value
             if not trace_first:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hybrid_rt as hrt
-from hybrid_rt.judge import metrics
+from hybrid_rt.judging import metrics
 from hybrid_rt_bench.kinds.paper.columns import PIXEL_CLASSES
 from hybrid_rt_bench.measure import shade
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import hybrid_rt as hrt
 from hybrid_rt_bench.kinds.paper import cell
 from hybrid_rt_bench.kinds.paper.columns import SCHEMA
 from hybrid_rt_bench.kinds.paper.spec import PaperExperiment
@@ -14,7 +15,6 @@ from hybrid_rt_bench.measure.lifecycle import Outcome, Session, carry_out, cell_
 from hybrid_rt_bench.measure.loaded import LoadedScene
 from hybrid_rt_bench.measure.plan import PlannedScene, make_plan
 from hybrid_rt_bench.measure.progress import Reporter
-from hybrid_rt_bench.measure.techniques import Technique, get_technique
 
 
 def run_paper(
@@ -55,7 +55,7 @@ def run_paper(
         The folder can no longer be written to.
     """
     workers = env.checked_threads(threads)
-    techniques = [get_technique(name) for name in experiment.techniques]
+    techniques = [hrt.TECHNIQUES[name]() for name in experiment.techniques]
     reporter.doing("reading scenes")
     plan = make_plan(experiment, scenes, cameras)
     return carry_out(
@@ -75,7 +75,7 @@ class _Run:
     """All cells of a run, one after the other."""
 
     def __init__(
-        self, experiment: PaperExperiment, techniques: list[Technique], session: Session
+        self, experiment: PaperExperiment, techniques: list[hrt.Technique], session: Session
     ) -> None:
         self.experiment, self.techniques, self.session = experiment, techniques, session
         self.rounds = experiment.warmup + experiment.rounds

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import hybrid_rt as hrt
-from hybrid_rt.kernels.techniques.certified import lanes
+from hybrid_rt.kernels.techniques.certified import slots
 from hybrid_rt_bench.kinds.roofline import reckon as roofline
 from hybrid_rt_bench.kinds.roofline.spec import RooflineExperiment
 from hybrid_rt_bench.measure import strongest
@@ -30,9 +30,6 @@ from hybrid_rt_bench.results import statistics as stats
 
 Row = dict[str, Any]
 
-MARCH = hrt.Certified()
-SCALAR = hrt.Certified(vectors=False)
-START = hrt.Certified(max_steps=1)
 
 RAY_BYTES = 3 * 4 + 3 * 4 + 4 + 4
 """Origin, direction, t_near and t_far, which set-up reads."""
@@ -72,10 +69,10 @@ def measure_cell(
     Raises
     ------
     CellError
-        The camera sees no surface, or the view is too large for the lanes.
+        The camera sees no surface, or the view is too large for the slots.
     """
-    gbuffer = hrt.rasterize(loaded.scene, camera, lists=experiment.lists, threads=threads)
-    pyramid = hrt.build_depth_pyramid(gbuffer, conservative=True, threads=threads)
+    gbuffer = hrt.rasterize(loaded.scene, camera, threads=threads)
+    screen = hrt.Certified(lists=experiment.lists).prepare(gbuffer, threads=threads)
     rays = hrt.mirror_rays(gbuffer)
     if len(rays) == 0:
         raise CellError(f"{name}: the camera sees no surface, so there are no mirror rays")
@@ -85,7 +82,7 @@ def measure_cell(
     first_hit = strongest.choose(loaded.candidates, primary, experiment.selection_rays).best.tracer
     stages = [
         _Stages(
-            rays, gbuffer, pyramid, choice.best.tracer.with_path(threads=n),
+            rays, screen, choice.best.tracer.with_path(threads=n),
             primary, first_hit.with_path(threads=n), n,
         )
         for n in counts
@@ -104,7 +101,7 @@ def measure_cell(
         "technique": "certified",
         "rays": len(rays),
         "alpha": float(marched.resolved.mean()),
-        **work_columns(marched, gbuffer, pyramid),
+        **work_columns(marched, screen),
     }
     results = [
         {**row, "threads": n, **time_columns([s for s in samples if s["threads"] == n], len(rays))}
@@ -123,8 +120,7 @@ class _Stages:
     """What is timed of a view on one number of threads."""
 
     rays: hrt.Rays
-    gbuffer: hrt.GBuffer
-    pyramid: hrt.DepthPyramid
+    screen: hrt.Screen
     tracer: hrt.EmbreeTracer
     primary: hrt.Rays
     primary_tracer: hrt.EmbreeTracer
@@ -132,9 +128,7 @@ class _Stages:
 
     def hybrid(self) -> hrt.HybridResult:
         """March, and hand over the rest."""
-        return hrt.trace_hybrid(
-            self.rays, self.gbuffer, self.pyramid, self.tracer, MARCH, threads=self.threads
-        )
+        return hrt.trace_hybrid(self.rays, self.screen, self.tracer, threads=self.threads)
 
     def round(self, number: int) -> dict[str, float]:
         """Return the seconds of every stage; every other round goes the other way round."""
@@ -146,17 +140,18 @@ class _Stages:
             found[stage] = time.perf_counter() - start
 
         def raster() -> None:
-            drawn = hrt.rasterize(self.gbuffer.scene, self.gbuffer.camera, threads=self.threads)
+            drawn = hrt.rasterize(self.screen.scene, self.screen.camera, threads=self.threads)
             found.update(drawn.timings)
 
-        def march(mode: hrt.Certified) -> hrt.Marched:
-            return hrt.march(self.rays, self.gbuffer, self.pyramid, mode, threads=self.threads)
+        def march(**changes: Any) -> hrt.Marched:
+            changed = dataclasses.replace(self.screen.technique, **changes)
+            return hrt.march(self.rays, self.screen.of(changed), threads=self.threads)
 
         calls: list[Callable[[], None]] = [
             lambda: timed("embree", lambda: self.tracer.intersect(self.rays)),
             lambda: found.update(self.hybrid().timings),
-            lambda: timed("scalar", lambda: march(SCALAR)),
-            lambda: timed("start", lambda: march(START)),
+            lambda: timed("scalar", lambda: march(vectors=False)),
+            lambda: timed("start", lambda: march(max_steps=1)),
             lambda: timed("raster", raster),
             lambda: timed("primary", lambda: self.primary_tracer.intersect(self.primary)),
         ]
@@ -171,31 +166,30 @@ class _Stages:
         return {stage: found[stage] for stage in kept}
 
 
-def work_columns(marched: hrt.Marched, gbuffer: hrt.GBuffer, pyramid: hrt.DepthPyramid) -> Row:
+def work_columns(marched: hrt.Marched, screen: hrt.Screen) -> Row:
     """Return what the lanes counted, and what of which structure they gathered for it."""
-    work, lists = marched.work, gbuffer.lists
+    work, lists, pyramid = marched.work, screen.data.lists, screen.data.pyramid
     assert work is not None
-    assert lists is not None
     # Of the numbers of a plane or a triangle, which lie side by side, one is to be waited for.
     gathered = {
-        "pyramid": (work.steps * lanes.CELLS_A_STEP, 1),
-        "lists": (work.entries * lanes.NUMBERS_AN_ENTRY + work.rests * lanes.NUMBERS_A_REST, 1),
-        "planes": (work.planes * lanes.NUMBERS_A_PLANE, lanes.NUMBERS_A_PLANE),
-        "corners": (work.tests * lanes.NUMBERS_A_TEST, lanes.NUMBERS_A_TEST),
+        "pyramid": (work.steps * slots.CELLS_A_STEP, 1),
+        "lists": (work.entries * slots.NUMBERS_AN_ENTRY + work.rests * slots.NUMBERS_A_REST, 1),
+        "planes": (work.planes * slots.NUMBERS_A_PLANE, slots.NUMBERS_A_PLANE),
+        "corners": (work.tests * slots.NUMBERS_A_TEST, slots.NUMBERS_A_TEST),
         "slots": (
-            work.refills * lanes.ROWS_A_REFILL
-            + work.looks * lanes.ROWS_A_LOOK
-            + work.tests * lanes.ROWS_A_TEST,
+            work.refills * slots.ROWS_A_REFILL
+            + work.looks * slots.ROWS_A_LOOK
+            + work.tests * slots.ROWS_A_TEST,
             1,
         ),
     }
-    row_bytes = 4 * (lanes.F32_ROWS + lanes.I32_ROWS) + 8 * lanes.F64_ROWS
+    row_bytes = 4 * (slots.F32_ROWS + slots.I32_ROWS) + 8 * slots.F64_ROWS
     sizes = {
         "pyramid": 4 * int((pyramid.widths * pyramid.heights).sum()),
         "lists": lists.prim_id.nbytes + lists.nearest.nbytes + lists.rest.nbytes,
         "planes": lists.planes.nbytes,
-        "corners": gbuffer.scene.corners.nbytes,
-        "slots": lanes.STRIDE * row_bytes,
+        "corners": screen.scene.corners.nbytes,
+        "slots": slots.STRIDE * row_bytes,
     }
     columns: Row = dataclasses.asdict(work)
     columns |= {f"busy_{stage}": share for stage, share in work.busy.items()}
@@ -207,7 +201,7 @@ def work_columns(marched: hrt.Marched, gbuffer: hrt.GBuffer, pyramid: hrt.DepthP
             f"{name}_places": numbers // together,
         }
     gathered_bytes = 4 * sum(numbers for numbers, _ in gathered.values())
-    written = sum(array.nbytes for array in marched.rows)
+    written = sum(array.nbytes for array in marched.arrays)
     columns["touched_bytes"] = gathered_bytes + RAY_BYTES * len(marched) + written
     return columns
 

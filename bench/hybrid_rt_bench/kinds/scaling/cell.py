@@ -24,7 +24,6 @@ from hybrid_rt_bench.measure import compiling, memory, strongest
 from hybrid_rt_bench.measure.errors import CellError
 from hybrid_rt_bench.measure.loaded import native_path
 from hybrid_rt_bench.measure.plan import find_scene
-from hybrid_rt_bench.measure.techniques import get_technique
 
 TRIED_RAYS = 64
 """On how many rays it is tried how long brute force would take."""
@@ -44,8 +43,6 @@ class Task:
     threads : int
         For every stage alike.
     techniques : tuple of str
-    lists : int
-        Length of the lists of primitives for technique "certified".
     selection_rays : int
     build : bool
         Whether Embree's structure is built in every pass.
@@ -62,7 +59,6 @@ class Task:
     height: int
     threads: int
     techniques: tuple[str, ...]
-    lists: int
     selection_rays: int
     build: bool
     brute_rays: int = 0
@@ -116,9 +112,7 @@ class Stages:
         # In every cell the same build is timed, also where embreex's own path, which copies the
         # scene through Python, is the strongest.
         self.built = {**self.options, "path": native_path()}
-        self.modes = {name: get_technique(name).mode for name in task.techniques}
-        self.screens = {name: _screen(mode) for name, mode in self.modes.items()}
-        self.needed = {stage for stages in self.screens.values() for stage in stages}
+        self.techniques = {name: hrt.TECHNIQUES[name]() for name in task.techniques}
         self.brute = hrt.BruteForceTracer(scene, threads=task.threads)
         self.brute_rays = task.brute_rays
         self.alpha: dict[str, float] = {}
@@ -152,38 +146,19 @@ class Stages:
             del built
         tracer = self.tracer
         assert tracer is not None
-        plain = timed("raster", lambda: hrt.rasterize(self.scene, self.camera, threads=threads))
-        made: dict[str, Any] = {"raster": plain}
-        if "raster_lists" in self.needed:
-            made["raster_lists"] = timed(
-                "raster_lists",
-                lambda: hrt.rasterize(
-                    self.scene, self.camera, lists=self.task.lists, threads=threads
-                ),
-            )
-        made["pyramid"] = timed("pyramid", lambda: hrt.build_depth_pyramid(plain, threads=threads))
-        if "pyramid_conservative" in self.needed:
-            made["pyramid_conservative"] = timed(
-                "pyramid_conservative",
-                lambda: hrt.build_depth_pyramid(
-                    made["raster_lists"], conservative=True, threads=threads
-                ),
-            )
-        if "pyramid_slope" in self.needed:
-            made["pyramid_slope"] = timed(
-                "pyramid_slope", lambda: hrt.build_slope_pyramid(plain, threads=threads)
-            )
-        rays = timed("rays", lambda: hrt.mirror_rays(plain))
+        gbuffer = timed("raster", lambda: hrt.rasterize(self.scene, self.camera, threads=threads))
+        rays = timed("rays", lambda: hrt.mirror_rays(gbuffer))
         if trace_first:
             timed("embree", lambda: tracer.intersect(rays))
-        for name, mode in self.modes.items():
-            gbuffer, pyramid = (made[stage] for stage in self.screens[name])
-            result = hrt.trace_hybrid(rays, gbuffer, pyramid, tracer, mode=mode, threads=threads)
+        for name, technique in self.techniques.items():
+            screen = technique.prepare(gbuffer, threads=threads)
+            seconds[name, "prepare"] = screen.seconds
+            result = hrt.trace_hybrid(rays, screen, tracer, threads=threads)
             for stage, value in result.timings.items():
                 seconds[name, stage] = float(value)
             self.alpha[name] = float(result.resolved.mean())
             self.steps[name] = float(result.marched.steps.mean())
-            del result  # not while the next one makes its own
+            del screen, result  # not while the next one makes its own
         if not trace_first:
             timed("embree", lambda: tracer.intersect(rays))
         if self.brute_rays:
@@ -237,7 +212,7 @@ class Cell:
         tracer, rays, found = _strongest(scene, camera, task)
         self.stages = Stages(scene, camera, tracer, task)
         del tracer
-        details |= {"rays": len(rays), **found, "screens": self.stages.screens}
+        details |= {"rays": len(rays), **found}
         if task.brute_rays:
             details["brute_force_seconds"] = self._try_brute(rays)
         del rays
@@ -312,10 +287,3 @@ def _strongest(
     )  # fmt: skip
     found = {"embree_path": choice.best.label, "embree_ns_per_ray": choice.nanoseconds}
     return alone, rays, found
-
-
-def _screen(mode: hrt.Mode) -> tuple[str, str]:
-    """Return the stages that make what a mode reads."""
-    if isinstance(mode, hrt.Certified):
-        return "raster_lists", "pyramid_conservative"
-    return "raster", "pyramid_slope" if isinstance(mode, hrt.SlopeAware) else "pyramid"

@@ -49,10 +49,6 @@ SHARED_LOOKS: dict[str, tuple[str, str]] = {
     "brute_force": (GREY, "x"),
     "build": (ORANGE, "s"),
     "raster": (BLUE, "o"),
-    "raster_lists": (GREEN, "^"),
-    "pyramid": (SKY, "D"),
-    "pyramid_conservative": (PURPLE, "v"),
-    "pyramid_slope": ("#E69F00", "P"),
 }
 """Colour and marker of the stages that belong to no technique."""
 
@@ -113,7 +109,7 @@ def time_over_axis(run: RunData, name: str) -> Figure:
     left = [key for key in keys if key[1] in shown]
     if column == "ms":
         left = [key for key in left if key[1] != "brute_force"]
-    right = [key for key in keys if key[0] == SHARED and key[1] not in A_RAY]
+    right = [key for key in keys if key[1] not in A_RAY]
     figure = Figure(figsize=(11.4, 6.0))
     axes = _grid(figure, 2, max(len(left), len(right)))
     techniques = [t for t in dict.fromkeys(part.technique) if t != SHARED]

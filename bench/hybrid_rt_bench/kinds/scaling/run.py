@@ -28,7 +28,6 @@ from hybrid_rt_bench.measure.errors import NothingToRunError
 from hybrid_rt_bench.measure.lifecycle import Outcome, Session, carry_out
 from hybrid_rt_bench.measure.plan import Plan, find_scene, size_text
 from hybrid_rt_bench.measure.progress import Reporter
-from hybrid_rt_bench.measure.techniques import get_technique
 
 FEW_THREADS = 8
 """Up to so many threads every number is measured, beyond them about three in each doubling."""
@@ -97,7 +96,7 @@ class Measured:
             if row["phase"] == "measured":
                 found.setdefault((row["technique"], row["stage"]), []).append(row["seconds"])
         arrays = {key: np.array(values) for key, values in found.items()}
-        return with_sums(arrays, self.details["screens"])
+        return with_sums(arrays, self.planned.task.techniques)
 
     def record(self) -> tuple[dict[str, Any], list[dict[str, Any]], list[dict[str, Any]]]:
         """Return the cell, its samples and its results, for `RunWriter.add_cell`."""
@@ -184,7 +183,7 @@ def run_scaling(
     workers = env.checked_threads(threads)
     experiment = experiment.picked(series, triangles)
     for name in experiment.techniques:
-        get_technique(name)
+        hrt.TECHNIQUES[name]  # refuses an unknown one, with a suggestion
     planned, notes = plan_series(experiment, workers)
 
     return carry_out(
@@ -255,7 +254,7 @@ def _cells(
         brute = series.brute_force
         return Task(
             series.scene, camera, size, resolution.width, resolution.height, workers,
-            tuple(experiment.techniques), experiment.lists, experiment.selection_rays, series.build,
+            tuple(experiment.techniques), experiment.selection_rays, series.build,
             brute.rays if brute else 0, brute.seconds if brute else 0.0,
         )  # fmt: skip
 

@@ -118,8 +118,6 @@ class ScalingExperiment(AnyExperiment):
     ----------
     techniques : list of str
         Registered techniques, with their default parameters.
-    lists : int
-        Length of the lists of primitives that technique "certified" reads.
     series : list of Series
     rounds : int
         Measured rounds.
@@ -131,7 +129,6 @@ class ScalingExperiment(AnyExperiment):
 
     kind: Literal["scaling"] = "scaling"
     techniques: Names
-    lists: int = Field(default=8, strict=True, ge=1, le=16)
     series: list[Series] = Field(min_length=1)
     rounds: Rounds
     warmup: Passes = 1

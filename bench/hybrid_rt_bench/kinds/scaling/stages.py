@@ -17,19 +17,16 @@ SHARED = ""
 STAGES: dict[str, str] = {
     "build": "Embree build",
     "raster": "raster",
-    "raster_lists": "raster with lists",
-    "pyramid": "depth pyramid",
-    "pyramid_conservative": "conservative depth pyramid",
-    "pyramid_slope": "slope pyramid",
     "rays": "mirror rays",
     "embree": "strongest Embree, every ray",
     "brute_force": "brute force, a sample",
+    "prepare": "what the march reads",
     "march": "march",
     "compaction": "compaction",
     "fallback": "fallback",
     "merge": "merge",
     "hybrid": "hybrid: march to merge",
-    "frame": "hybrid, raster and pyramid",
+    "frame": "hybrid, raster and what it reads",
 }
 """Every stage, those that are sums last, and what reports call it."""
 
@@ -54,7 +51,7 @@ def ordered(keys: Iterable[Key]) -> list[Key]:
 
 
 def with_sums(
-    seconds: dict[Key, NDArray[np.float64]], screens: dict[str, tuple[str, ...]]
+    seconds: dict[Key, NDArray[np.float64]], techniques: Iterable[str]
 ) -> dict[Key, NDArray[np.float64]]:
     """Return the seconds of each round with those of the hybrid and of the frame added.
 
@@ -62,14 +59,13 @@ def with_sums(
     ----------
     seconds : dict of array
         For each measured round, by technique and stage.
-    screens : dict of tuple of str
-        The stages that make what a technique reads.
+    techniques : iterable of str
     """
     sums: dict[Key, NDArray[np.float64]] = {}
-    for technique, stages in screens.items():
+    for technique in techniques:
         hybrid = np.sum([seconds[technique, stage] for stage in HYBRID_STAGES], axis=0)
-        sums[technique, "hybrid"] = hybrid
-        sums[technique, "frame"] = hybrid + np.sum([seconds[SHARED, s] for s in stages], axis=0)
+        made = seconds[SHARED, "raster"] + seconds[technique, "prepare"]
+        sums[technique, "hybrid"], sums[technique, "frame"] = hybrid, hybrid + made
     return {**seconds, **sums}
 
 

@@ -191,8 +191,8 @@ def times(run: RunData, name: str) -> Table:
     )  # fmt: skip
     table.notes.append(
         f"{_capital(fixed(part))}. Median of {_round_counts(part)}. The hybrid: march, "
-        "compaction, fallback and merge; in the line after it the raster and the pyramid that it "
-        "reads as well. "
+        "compaction, fallback and merge; in the line after it also the raster, and what the march "
+        "reads. "
         "Intervals are in results.csv, every sample in samples.parquet."
     )
     return table

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import hybrid_rt as hrt
+from hybrid_rt import TECHNIQUES
 from hybrid_rt_bench.kinds.stability.columns import SCHEMA
 from hybrid_rt_bench.kinds.stability.spec import StabilityExperiment
 from hybrid_rt_bench.measure import compiling
@@ -19,7 +20,6 @@ from hybrid_rt_bench.measure.lifecycle import Outcome, Session, carry_out
 from hybrid_rt_bench.measure.loaded import native_path
 from hybrid_rt_bench.measure.plan import Plan
 from hybrid_rt_bench.measure.progress import Reporter
-from hybrid_rt_bench.measure.techniques import TECHNIQUES, Technique, get_technique
 from hybrid_rt_scenes.hard_cases import (
     BuiltCase,
     CaseResult,
@@ -79,7 +79,7 @@ def run_stability(
     threads = env.checked_threads(threads)
     named = cases or experiment.cases or hard_case_names()
     chosen = [get_hard_case(name) for name in dict.fromkeys(named)]
-    techniques = [get_technique(name) for name in experiment.techniques or TECHNIQUES]
+    techniques = [TECHNIQUES[name]() for name in experiment.techniques or TECHNIQUES]
     entrants = _entrants(experiment, techniques, threads)
     failed_by: dict[str, list[str]] = {}
     outcome = carry_out(
@@ -147,15 +147,16 @@ def stages_to_compile(entrants: list[Entrant]) -> compiling.Stages:
 
 
 def _entrants(
-    experiment: StabilityExperiment, techniques: list[Technique], threads: int
+    experiment: StabilityExperiment, techniques: list[hrt.Technique], threads: int
 ) -> list[Entrant]:
-    def marching(technique: Technique) -> Callable[[BuiltCase], Answers]:
+    def marching(technique: hrt.Technique) -> Callable[[BuiltCase], Answers]:
         def answer(case: BuiltCase) -> Answers:
-            mode = technique.mode
-            if case.max_steps is not None and hasattr(mode, "max_steps"):
-                mode = dataclasses.replace(mode, max_steps=case.max_steps)
-            pyramid = hrt.build_depth_pyramid(case.gbuffer, threads=threads)
-            return hrt.march(case.rays, case.gbuffer, pyramid, mode, threads=threads)
+            steps = {} if case.max_steps is None else {"max_steps": case.max_steps}
+            changed = technique
+            if hasattr(technique, "max_steps"):
+                changed = dataclasses.replace(technique, **steps)
+            screen = changed.prepare(case.gbuffer, threads=threads)
+            return hrt.march(case.rays, screen, threads=threads)
 
         return answer
 

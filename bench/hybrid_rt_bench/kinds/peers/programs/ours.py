@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 import hybrid_rt as hrt
-from hybrid_rt.techniques.certified import LENGTH
 from hybrid_rt_bench.kinds.peers.programs.base import (
     Answers,
     Drawing,
@@ -19,13 +18,14 @@ from hybrid_rt_bench.kinds.peers.programs.base import (
     View,
 )
 from hybrid_rt_bench.measure import strongest
+from hybrid_rt_bench.measure.loaded import native_path
 
 
 class Embree(Opened):
     """Embree by whichever of its paths is fastest on the rays asked about."""
 
     def __init__(self, scene: hrt.Scene, threads: int) -> None:
-        path = "packet" if hrt.packet_available() is None else "run"
+        path = native_path()
         self.scene, self.threads, self._path = scene, threads, path
         self.reference = hrt.EmbreeTracer(scene, threads=threads, path=path, robust=True)
         self.build_seconds = self.reference.build_seconds
@@ -64,15 +64,11 @@ class Hybrid(Opened):
         """Return the hybrid's query; the lists of primitives and the pyramid are made in here."""
         if view.gbuffer is None:  # primary rays are what the raster answers
             return None
-        camera, threads = view.gbuffer.camera, self.threads
-        gbuffer = hrt.rasterize(self.scene, camera, lists=LENGTH, threads=threads)
-        pyramid = hrt.build_depth_pyramid(gbuffer, conservative=True, threads=threads)
-        tracer = view.tracer or hrt.EmbreeTracer(self.scene, threads=threads)
+        screen = hrt.prepare(view.gbuffer, "certified", threads=self.threads)
+        tracer = view.tracer or hrt.EmbreeTracer(self.scene, threads=self.threads)
 
         def run() -> hrt.Hits:
-            return hrt.trace_hybrid(
-                view.rays, gbuffer, pyramid, tracer, mode="certified", threads=threads
-            ).hits
+            return hrt.trace_hybrid(view.rays, screen, tracer, threads=self.threads).hits
 
         return Query(run, hits, f"fallback: {view.label}")
 

@@ -1,0 +1,1 @@
+"""Junk at every argument of the public API, in processes that may die of it."""
