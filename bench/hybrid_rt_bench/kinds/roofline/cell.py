@@ -185,7 +185,7 @@ def work_columns(marched: hrt.Marched, screen: hrt.Screen) -> Row:
     }
     row_bytes = 4 * (slots.F32_ROWS + slots.I32_ROWS) + 8 * slots.F64_ROWS
     sizes = {
-        "pyramid": 4 * int((pyramid.widths * pyramid.heights).sum()),
+        "pyramid": sum(pyramid.level(k).nbytes for k in range(len(pyramid))),
         "lists": lists.prim_id.nbytes + lists.nearest.nbytes + lists.rest.nbytes,
         "planes": lists.planes.nbytes,
         "corners": screen.scene.corners.nbytes,
