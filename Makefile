@@ -5,12 +5,16 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: help report test lint types contracts unit clean
+.PHONY: help report quick test lint types contracts fast unit mutation oldest fuzz clean
 
 help:
-	@echo "make report   run the paper experiment in its quick form on the built-in scenes"
-	@echo "make test     lint, types, import contracts and all tests"
-	@echo "make clean    remove .venv and caches"
+	@echo "make report     run the paper experiment in its quick form on the built-in scenes"
+	@echo "make quick      before a commit: lint, types, import contracts and the fast tests"
+	@echo "make test       lint, types, import contracts and all tests"
+	@echo "make mutation   take away the guards of the certified proof, one at a time"
+	@echo "make oldest     try everything once with the oldest dependencies that are allowed"
+	@echo "make fuzz       junk at every argument of the public API, all of it"
+	@echo "make clean      remove .venv and caches"
 
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -19,6 +23,8 @@ $(STAMP): pyproject.toml
 
 report: $(STAMP)
 	$(BIN)/hybrid-rt run paper --quick
+
+quick: lint types contracts fast
 
 test: lint types contracts unit
 
@@ -32,8 +38,20 @@ types: $(STAMP)
 contracts: $(STAMP)
 	$(BIN)/lint-imports
 
+fast: $(STAMP)
+	$(BIN)/pytest -m "not slow"
+
 unit: $(STAMP)
 	$(BIN)/pytest
+
+mutation: $(STAMP)
+	$(BIN)/python tests/mutation/guards.py --jobs 2
+
+oldest: $(STAMP)
+	$(BIN)/python tests/oldest/oldest.py
+
+fuzz: $(STAMP)
+	HYBRID_RT_FUZZ=1 $(BIN)/pytest tests/library/fuzz
 
 clean:
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -72,8 +72,11 @@ def array(
         low, high = int(arr.min()), int(arr.max())
         if low < info.min or high > info.max:
             raise ArgumentError(argument, f"integers that fit {want}", f"values {low} to {high}")
-    with np.errstate(over="ignore", invalid="ignore"):
-        return np.ascontiguousarray(arr, dtype=want)
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.ascontiguousarray(arr, dtype=want)
+    except MemoryError as error:
+        raise ArgumentError(argument, f"{expected} that memory can hold", describe(arr)) from error
 
 
 def owned(
@@ -82,7 +85,11 @@ def owned(
     """Return what `array` does, in memory that the caller has no hold of."""
     arr = array(argument, value, shape, dtype)
     if isinstance(value, np.ndarray) and np.may_share_memory(arr, value):
-        arr = arr.copy()
+        try:
+            return arr.copy()
+        except MemoryError as error:
+            expected = "an array that memory can hold"
+            raise ArgumentError(argument, expected, describe(arr)) from error
     return arr
 
 
@@ -148,12 +155,22 @@ def vector3(argument: str, value: Any) -> tuple[float, float, float]:
     expected = "three finite numbers"
     try:
         arr = np.asarray(value)
-        arr = arr.astype(np.float64) if arr.dtype.kind in "fiu" else np.empty(0)
+        with np.errstate(over="ignore"):
+            arr = arr.astype(np.float64) if arr.dtype.kind in "fiu" else np.empty(0)
     except Exception as error:  # of lists that are ragged, of somebody's own __array__
         raise ArgumentError(argument, expected, describe(value)) from error
     if arr.shape != (3,) or not np.isfinite(arr).all():
         raise ArgumentError(argument, expected, describe(value))
     return float(arr[0]), float(arr[1]), float(arr[2])
+
+
+def point3(argument: str, value: Any) -> tuple[float, float, float]:
+    """Return `value` as three floats within float32, as vertices have them."""
+    point = vector3(argument, value)
+    if max(map(abs, point)) > float(np.finfo(np.float32).max):
+        expected = "coordinates within float32, as vertices have them"
+        raise ArgumentError(argument, expected, describe(value))
+    return point
 
 
 def real(

@@ -85,6 +85,10 @@ class Point:
     label: str
     technique: Technique
 
+    def __post_init__(self) -> None:
+        _check.text("label", self.label)
+        _check.instance("technique", self.technique, Technique)
+
     @property
     def name(self) -> str:
         """The technique's name."""
@@ -253,7 +257,7 @@ class Technique(abc.ABC):
         _check.instance(f"what {self.name!r} returns", marched, Marched)
         camera = screen.camera
         size = len(rays), len(screen.scene), camera.width, camera.height
-        return marched.checked(f"what {self.name!r} returns", *size)
+        return marched._checked(f"what {self.name!r} returns", *size)
 
     def _read(self, gbuffer: GBuffer, threads: int | None) -> Any:
         """Return what `march` needs besides the G-buffer; for a technique to override."""

@@ -37,7 +37,9 @@ class Registry(Mapping[str, Thing], Generic[Thing]):
     """
 
     def __init__(self, what: str, group: str, package: str = "") -> None:
-        self.what, self.group, self.package = what, group, package
+        self.what = _check.text("what", what)
+        self.group = _check.text("group", group)
+        self.package = _check.text("package", package)
         self._things: dict[str, Thing] = {}
         self._broken: dict[str, PluginError] = {}
         self._looked = False
@@ -57,7 +59,7 @@ class Registry(Mapping[str, Thing], Generic[Thing]):
             expected = "lower-case letters, digits and any of _ . + -, a letter first"
             raise ArgumentError(f"name of a {self.what}", expected, _check.describe(name))
         before = self._things.get(name)
-        if before is not None and _place(before) != _place(thing):
+        if before is not None and before != thing and _place(before) != _place(thing):
             got = f"{name!r}, which {_place(before)} has"
             raise ArgumentError(f"name of a {self.what}", "one that is not taken", got)
         self._things[name] = thing
@@ -68,10 +70,12 @@ class Registry(Mapping[str, Thing], Generic[Thing]):
 
     def __getitem__(self, name: str) -> Thing:
         self._look()
+        if not isinstance(name, str):
+            raise ArgumentError(f"name of a {self.what}", "a str", _check.describe(name))
         if name in self._broken:
             raise self._broken[name]
-        if not isinstance(name, str) or name not in self._things:
-            raise UnknownNameError(self.what, str(name), self._things)
+        if name not in self._things:
+            raise UnknownNameError(self.what, name, self._things)
         return self._things[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -84,7 +88,7 @@ class Registry(Mapping[str, Thing], Generic[Thing]):
 
     def __contains__(self, name: object) -> bool:
         self._look()
-        return name in self._things
+        return isinstance(name, str) and name in self._things
 
     def names(self) -> list[str]:
         """Return all names, sorted."""
@@ -116,6 +120,7 @@ class Registry(Mapping[str, Thing], Generic[Thing]):
 
 
 def _place(thing: Any) -> str:
-    """Return where a thing is defined."""
-    module = getattr(thing, "__module__", type(thing).__module__)
-    return f"{module}.{getattr(thing, '__qualname__', getattr(thing, 'name', thing))}"
+    """Return where a class is defined, or which object a thing is."""
+    if isinstance(thing, type):
+        return f"{thing.__module__}.{thing.__qualname__}"
+    return f"a {type(thing).__qualname__} at {id(thing):#x}"

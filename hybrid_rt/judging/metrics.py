@@ -165,7 +165,7 @@ def judge(
     answered = _check.array("resolved", resolved, ("N",), np.bool_)
     _check.same_length("resolved", answered, "rays", n)
     for name, hits in (("claimed", claimed), ("reference", reference)):
-        hits.checked(name, n, len(scene))
+        hits._checked(name, n, len(scene))
     if pixel is None:
         px = np.full((n, 2), -1, np.int32)
     else:

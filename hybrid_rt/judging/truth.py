@@ -179,7 +179,7 @@ class Truth:
         state = np.where(is_hit, HIT, np.where(np.isnan(grazed), MISSED, GRAZED))
         return state.astype(np.uint8), np.where(is_hit, t, grazed)
 
-    def tolerance(self, rays: Rays, prim_id: Any, t: F64) -> F64:
+    def tolerance(self, rays: Rays, prim_id: Any, t: Any) -> F64:
         """Return within how much of t another hit counts as the same: (N,) float64.
 
         ``8 * 2**-24 * (|t| + largest coordinate of origin and triangle / |direction|)``, and 0 for
@@ -187,12 +187,14 @@ class Truth:
         """
         _check.instance("rays", rays, Rays)
         named = self._named(prim_id, len(rays))
+        at = _check.array("t", t, ("N",), np.float64)
+        _check.same_length("t", at, "rays", len(rays))
         reach = np.empty(len(rays))
         with _threads.limited(self._threads):
             kernels.reach(
                 *rays.arrays[:2], named, self._vertices, self._faces, reach
             )  # fmt: skip
-        return np.where(named >= 0, kernels.TOUCH * np.abs(t) + reach, 0.0)
+        return np.where(named >= 0, kernels.TOUCH * np.abs(at) + reach, 0.0)
 
     def _named(self, prim_id: Any, n: int) -> I32:
         named: I32 = _check.array("prim_id", prim_id, ("N",), np.int32)

@@ -83,3 +83,23 @@ class PyramidArrays(NamedTuple):
     cells: F32
     offsets: I64
     pitches: I64
+
+
+class ListArrays(NamedTuple):
+    """Primitives that touch each pixel: as `hybrid_rt.raster.lists.PrimitiveLists` has them."""
+
+    prim_id: I32
+    nearest: F32
+    rest: F32
+    planes: F32
+
+
+class Box(NamedTuple):
+    """A view as a proof needs it: the pinhole, a bound of its rows' sizes, the scene's bounds."""
+
+    m: F64
+    eye: F64
+    near: float
+    spread: float
+    low: F64
+    high: F64

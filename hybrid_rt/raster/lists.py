@@ -8,7 +8,7 @@ import numpy as np
 
 from hybrid_rt import _threads
 from hybrid_rt.camera.pinhole import Camera
-from hybrid_rt.kernels.arrays import F32, I32
+from hybrid_rt.kernels.arrays import F32, I32, ListArrays
 from hybrid_rt.kernels.raster import lists as kernels
 from hybrid_rt.kernels.raster import lists_bins as bin_kernels
 from hybrid_rt.kernels.raster.bins import TILE, prefix_sums
@@ -49,6 +49,11 @@ class PrimitiveLists:
     camera: Camera
 
     @property
+    def arrays(self) -> ListArrays:
+        """All arrays, as kernels take them."""
+        return ListArrays(self.prim_id, self.nearest, self.rest, self.planes)
+
+    @property
     def length(self) -> int:
         """K, the largest number of primitives in a list."""
         return int(self.prim_id.shape[2])
@@ -56,7 +61,7 @@ class PrimitiveLists:
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays: 8 K + 4 a pixel, 32 a face."""
-        return sum(a.nbytes for a in (self.prim_id, self.nearest, self.rest, self.planes))
+        return sum(array.nbytes for array in self.arrays)
 
 
 MARGIN_ULPS = 16

@@ -72,11 +72,11 @@ class Hits:
         try:
             for mine, theirs in zip(self.arrays, values.arrays, strict=True):
                 mine[index] = theirs
-        except (IndexError, ValueError, TypeError) as error:
-            expected = f"rows of {len(self)} hits, as many as there are values"
+        except Exception as error:  # an index of anything, arrays that are read-only
+            expected = f"rows of {len(self)} writable hits, as many as there are values"
             raise ArgumentError("index", expected, f"{_check.describe(index)}: {error}") from error
 
-    def checked(self, argument: str, n: int, faces: int) -> Hits:
+    def _checked(self, argument: str, n: int, faces: int) -> Hits:
         """Return these hits if they can be those of N rays in a scene of so many faces.
 
         Raises

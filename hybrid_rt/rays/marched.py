@@ -173,7 +173,7 @@ class Marched:
             self.steps,
         )
 
-    def checked(self, argument: str, n: int, faces: int, width: int, height: int) -> Marched:
+    def _checked(self, argument: str, n: int, faces: int, width: int, height: int) -> Marched:
         """Return this if it can be what a screen says of N rays.
 
         Raises

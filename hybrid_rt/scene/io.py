@@ -65,9 +65,13 @@ def read_mesh(path: str | Path) -> Mesh:
     path = Path(path)
     if "\0" in str(path):
         raise ArgumentError("path", "a path without NUL characters", _check.describe(str(path)))
-    if path.is_dir():
+    try:
+        folder, there = path.is_dir(), path.exists()
+    except OSError as error:  # a name that is too long, a folder that may not be looked into
+        raise MeshFileError(f"{path}: {error.strerror}") from error
+    if folder:
         raise MeshFileError(f"{path}: expected a mesh file, got a folder")
-    if not path.exists():
+    if not there:
         raise MeshFileError(f"{path}: no such file")
     if not path.is_file():
         raise MeshFileError(f"{path}: expected a regular file, got a device, pipe or socket")

@@ -154,6 +154,7 @@ class Scene(_Triangles):
 
     def same_as(self, other: Scene) -> bool:
         """Return whether `other` has the same triangles in the same order."""
+        _check.instance("other", other, Scene)
         return self is other or (
             np.array_equal(self.faces, other.faces)
             and np.array_equal(self.vertices, other.vertices)

@@ -12,7 +12,7 @@ from hybrid_rt import _check, _threads
 from hybrid_rt.base import Point, Screen, Technique, register
 from hybrid_rt.camera.pinhole import LARGEST_SIDE, Camera
 from hybrid_rt.errors import ArgumentError
-from hybrid_rt.kernels.arrays import F64
+from hybrid_rt.kernels.arrays import Box
 from hybrid_rt.kernels.techniques.certified import lanes, scalar, slots
 from hybrid_rt.raster.gbuffer import GBuffer
 from hybrid_rt.raster.lists import PrimitiveLists, primitive_lists
@@ -148,6 +148,7 @@ class Certified(Technique):
         ArgumentError
             With the guard band it would have more pixels along a side than a camera may.
         """
+        _check.instance("camera", camera, Camera)
         longest = max(camera.width, camera.height) * self.guard
         if longest > LARGEST_SIDE:
             most = LARGEST_SIDE / max(camera.width, camera.height)
@@ -237,7 +238,7 @@ def _in_lanes(
         lanes.march(
             (origin.reshape(-1), direction.reshape(-1), t_near, t_far),
             (width, height),
-            _box(scene, camera),
+            tuple(_box(scene, camera)),
             lists.prim_id.reshape(-1),
             lists.nearest.reshape(-1),
             lists.rest.reshape(-1),
@@ -263,29 +264,26 @@ def _one_by_one(
     threads: int | None,
 ) -> Marched:
     """March one ray after the other."""
-    lists, camera, pyramid = data.lists, data.lists.camera, data.pyramid.arrays
+    camera, pyramid = data.lists.camera, data.pyramid.arrays
     # As the lanes, rays go up to the level at which the shorter axis is one cell.
     levels = min(bits(camera.width, camera.height)) + 1
     marched = Marched.unfilled(len(rays))
-    origin, direction, _, t_near, t_far = rays.arrays
     with _threads.limited(threads) as workers:
         steps_by_level = np.zeros((workers, len(data.pyramid)), np.int64)
         tests = np.zeros((workers, 1), np.int64)
         scalar.march(
-            origin, direction, t_near, t_far,
-            lists.prim_id, lists.nearest, lists.rest, lists.planes,
-            pyramid.cells, pyramid.offsets[:levels], pyramid.pitches,
-            scene.arrays.vertices, scene.arrays.faces, *_box(scene, camera), *limits,
-            *marched.arrays, steps_by_level, tests,
+            rays.arrays, _box(scene, camera), data.lists.arrays,
+            pyramid._replace(offsets=pyramid.offsets[:levels]), scene.arrays, limits,
+            marched.arrays, steps_by_level, tests,
         )  # fmt: skip
     return replace(marched, steps_by_level=steps_by_level.sum(axis=0), tests=int(tests.sum()))
 
 
-def _box(scene: Scene, camera: Camera) -> tuple[F64, F64, float, float, F64, F64]:
-    """Return the projection, the eye, the near plane, `spread` (see `scalar.trusted`), bounds."""
+def _box(scene: Scene, camera: Camera) -> Box:
+    """Return a view as a proof needs it; `spread`: see `scalar.trusted`."""
     m, eye, near = camera.arrays
     rows = np.abs(m).sum(axis=1)
     longer = max(camera.width, camera.height) + 1
     low, high = scene.bounds.copy()
     spread = float(max(rows[0], rows[1]) / longer + rows[2])
-    return m, eye, near, spread, low, high
+    return Box(m, eye, near, spread, low, high)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hybrid_rt import _check
-from hybrid_rt.base import Point, Screen, Technique, register
+from hybrid_rt.base import Point, Screen, register
 from hybrid_rt.kernels.techniques.paper import PaperNumbers
 from hybrid_rt.raster.gbuffer import GBuffer
 from hybrid_rt.raster.pyramid import DepthPyramid, build_depth_pyramid
@@ -16,7 +15,7 @@ from hybrid_rt.techniques import stepping
 
 @register
 @dataclass(frozen=True)
-class Paper(Technique):
+class Paper(stepping.Sampled):
     """The strict march of the paper, "paper".
 
     Nearest depths of cells, one level coarser after free samples, one finer after a blocked one;
@@ -43,13 +42,6 @@ class Paper(Technique):
     )
     reference = "Pikulsky 2025"
 
-    samples: int = 4
-    max_steps: int | None = None
-
-    def __post_init__(self) -> None:
-        _check.integer("samples", self.samples, least=1, most=stepping.MOST)
-        stepping.checked_steps(self.max_steps)
-
     @property
     def reads(self) -> tuple[str, ...]:
         """The depth pyramid."""
@@ -57,14 +49,12 @@ class Paper(Technique):
 
     @classmethod
     def _grid(cls, which: str) -> list[Point]:
-        counts = (1, 2, 4, 8) if which == "all" else (4,)
-        return [Point(f"samples {n}", cls(samples=n)) for n in counts]
+        return cls._points(1, 2, 4, 8) if which == "all" else cls._points(4)
 
     def _read(self, gbuffer: GBuffer, threads: int | None) -> DepthPyramid:
         return build_depth_pyramid(gbuffer, threads=threads)
 
     def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
-        camera, pyramid = screen.camera, screen.data
-        enough = 2 * (camera.width + camera.height) + 2
-        numbers = PaperNumbers(int(self.samples), int(self.max_steps or enough))
+        numbers = PaperNumbers(*self._budgets(screen.camera))
+        pyramid = screen.data
         return stepping.march(rays, screen, pyramid.arrays, len(pyramid), numbers, threads)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hybrid_rt import _check
-from hybrid_rt.base import Point, Screen, Technique, register
+from hybrid_rt.base import Point, Screen, register
 from hybrid_rt.kernels.techniques.slope import SlopeNumbers
 from hybrid_rt.raster.gbuffer import GBuffer
 from hybrid_rt.raster.slope_pyramid import SlopePyramid, build_slope_pyramid
@@ -16,7 +15,7 @@ from hybrid_rt.techniques import stepping
 
 @register
 @dataclass(frozen=True)
-class SlopeAware(Technique):
+class SlopeAware(stepping.Sampled):
     """The paper's march over planes instead of depths, "slope".
 
     A cell holds a plane in front of all its pixels' tilted planes (`SlopePyramid`), so a floor seen
@@ -41,13 +40,6 @@ class SlopeAware(Technique):
     )
     reference = "this project"
 
-    samples: int = 4
-    max_steps: int | None = None
-
-    def __post_init__(self) -> None:
-        _check.integer("samples", self.samples, least=1, most=stepping.MOST)
-        stepping.checked_steps(self.max_steps)
-
     @property
     def reads(self) -> tuple[str, ...]:
         """The pyramid of planes."""
@@ -55,14 +47,12 @@ class SlopeAware(Technique):
 
     @classmethod
     def _grid(cls, which: str) -> list[Point]:
-        counts = (1, 4) if which == "all" else (4,)
-        return [Point(f"samples {n}", cls(samples=n)) for n in counts]
+        return cls._points(1, 4) if which == "all" else cls._points(4)
 
     def _read(self, gbuffer: GBuffer, threads: int | None) -> SlopePyramid:
         return build_slope_pyramid(gbuffer, threads=threads)
 
     def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
-        camera, pyramid = screen.camera, screen.data
-        enough = 2 * (camera.width + camera.height) + 2
-        numbers = SlopeNumbers(int(self.samples), int(self.max_steps or enough))
+        numbers = SlopeNumbers(*self._budgets(screen.camera))
+        pyramid = screen.data
         return stepping.march(rays, screen, pyramid.arrays, len(pyramid), numbers, threads)

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from hybrid_rt import _check, _threads
-from hybrid_rt.base import Screen
+from hybrid_rt.base import Point, Screen, Technique
+from hybrid_rt.camera.pinhole import Camera
 from hybrid_rt.kernels.techniques import driver
 from hybrid_rt.rays.marched import Marched
 from hybrid_rt.rays.rays import Rays
@@ -58,6 +59,27 @@ def checked_steps(max_steps: int | None) -> None:
     """Raise unless `max_steps` is a step budget, or None for one that no ray can use up."""
     if max_steps is not None:
         _check.integer("max_steps", max_steps, least=1, most=MOST)
+
+
+@dataclass(frozen=True)
+class Sampled(Technique):
+    """A technique of the paper's kind: so many samples of one level before the level may rise."""
+
+    samples: int = 4
+    max_steps: int | None = None
+
+    def __post_init__(self) -> None:
+        _check.integer("samples", self.samples, least=1, most=MOST)
+        checked_steps(self.max_steps)
+
+    @classmethod
+    def _points(cls, *samples: int) -> list[Point]:
+        return [Point(f"samples {n}", cls(samples=n)) for n in samples]
+
+    def _budgets(self, camera: Camera) -> tuple[int, int]:
+        """Return the samples of a level and the steps of a ray; by default more than any takes."""
+        enough = 2 * (camera.width + camera.height) + 2
+        return int(self.samples), int(self.max_steps or enough)
 
 
 def march(

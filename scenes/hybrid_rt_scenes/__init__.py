@@ -1,9 +1,11 @@
 """Scenes by name: real ones from files, and places generated from code."""
 
 from hybrid_rt_scenes.registry import (
+    SCENES,
     automatic_cameras,
     get_scene,
     read_definition,
+    register,
     scene_from_path,
     scene_names,
 )
@@ -18,6 +20,7 @@ from hybrid_rt_scenes.spec import (
 )
 
 __all__ = [
+    "SCENES",
     "CameraSpec",
     "LightsSpec",
     "MeshSpec",
@@ -28,6 +31,7 @@ __all__ = [
     "data_directory",
     "get_scene",
     "read_definition",
+    "register",
     "scene_from_path",
     "scene_names",
 ]

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import hybrid_rt as hrt
-from hybrid_rt import _check
-from hybrid_rt_scenes.builder import Builder, choose_detail
+from hybrid_rt_scenes.builder import Builder, checked_size, choose_detail
 from hybrid_rt_scenes.furniture import vase
 from hybrid_rt_scenes.ornament import (
     along,
@@ -102,9 +101,7 @@ def atrium(size: int = 2**18, seed: int = 1) -> hrt.Mesh:
     ArgumentError
         `size` or `seed` is not an integer or out of range.
     """
-    _check.integer("size", size, least=SMALLEST, most=LARGEST)
-    _check.integer("seed", seed, least=0)
-    rng = np.random.default_rng(seed)
+    rng = checked_size(size, seed, SMALLEST, LARGEST)
     builder = Builder()
     _add_shell(builder, 0.05 * size)
     _add_floor(builder, 0.06 * size, rng)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hybrid_rt import _check
 from hybrid_rt_scenes.primitives import Part, join, place
 
 
@@ -18,6 +19,12 @@ def choose_detail(cost: Callable[[int], float], budget: float, most: int) -> int
             break
         chosen = detail
     return chosen
+
+
+def checked_size(size: int, seed: int, least: int, most: int) -> np.random.Generator:
+    """Return the random numbers of a seed, once size and seed are found to be in range."""
+    _check.integer("size", size, least=least, most=most)
+    return np.random.default_rng(_check.integer("seed", seed, least=0))
 
 
 class Builder:

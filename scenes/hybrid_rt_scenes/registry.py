@@ -11,14 +11,44 @@ from pydantic import BaseModel, ValidationError
 
 import hybrid_rt as hrt
 from hybrid_rt import _check
+from hybrid_rt.registry import Registry
 from hybrid_rt_scenes.spec import CameraSpec, LightsSpec, MeshSpec, SceneSpec
 
 DEFINITIONS = Path(__file__).parent / "definitions"
 
 
+class _Scenes(Registry[SceneSpec]):
+    def check(self, thing: Any) -> None:
+        _check.instance("scene", thing, SceneSpec)
+        if thing.name in _defined():
+            raise hrt.ArgumentError("name of a scene", "one that is not taken", repr(thing.name))
+
+
+SCENES = _Scenes("scene", "hybrid_rt.scenes")
+"""Scenes that are not defined here: of entry points, and registered in a script."""
+
+
+def register(scene: SceneSpec) -> SceneSpec:
+    """Make a scene known by its name, and return it.
+
+    Installed distributions offer theirs as entry points of the group ``hybrid_rt.scenes``, each of
+    which names a `SceneSpec`.
+
+    Raises
+    ------
+    ArgumentError
+        No SceneSpec, or a name that is taken.
+    """
+    return SCENES.register(scene)
+
+
+def _defined() -> list[str]:
+    return [path.stem for path in DEFINITIONS.glob("*.toml")]
+
+
 def scene_names() -> list[str]:
-    """Return the names of all defined scenes, sorted, whether their data is there or not."""
-    return sorted(path.stem for path in DEFINITIONS.glob("*.toml"))
+    """Return the names of all scenes, sorted, whether their data is there or not."""
+    return sorted([*_defined(), *SCENES])
 
 
 def get_scene(name: str) -> SceneSpec:
@@ -29,10 +59,11 @@ def get_scene(name: str) -> SceneSpec:
     UnknownNameError
         No such scene; the message suggests the nearest name.
     """
-    names = scene_names()
-    if name not in names:
-        raise hrt.UnknownNameError("scene", name, names)
-    return read_definition(DEFINITIONS / f"{name}.toml")
+    if name in _defined():
+        return read_definition(DEFINITIONS / f"{name}.toml")
+    if name not in SCENES:
+        raise hrt.UnknownNameError("scene", str(name), scene_names())
+    return SCENES[name]
 
 
 def read_definition(path: Path) -> SceneSpec:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import hybrid_rt as hrt
-from hybrid_rt import _check
-from hybrid_rt_scenes.builder import Builder, choose_detail
+from hybrid_rt_scenes.builder import Builder, checked_size, choose_detail
 from hybrid_rt_scenes.facades import Facade, add_bays, add_tops, awning
 from hybrid_rt_scenes.furniture import bollard, cables, chair, lamp, parasol, table, vase
 from hybrid_rt_scenes.plants import Tree, foliage, ivy, wood
@@ -57,9 +56,7 @@ def street(size: int = 2**20, seed: int = 1) -> hrt.Mesh:
     ArgumentError
         `size` or `seed` is not an integer or out of range.
     """
-    _check.integer("size", size, least=SMALLEST, most=LARGEST)
-    _check.integer("seed", seed, least=0)
-    rng = np.random.default_rng(seed)
+    rng = checked_size(size, seed, SMALLEST, LARGEST)
     builder = Builder()
     facades = _facades(rng)
     _add_ground(builder)

@@ -68,14 +68,14 @@ def check_rays():
     rays = hrt.mirror_rays(gbuffer)
     tracer = hrt.EmbreeTracer(scene)
     hits = tracer.intersect(rays)
-    for name in hrt.techniques.names():
+    for name in hrt.TECHNIQUES:
         screen = hrt.prepare(gbuffer, name)
         assert hrt.march(rays, screen).resolved.any(), name
         result = hrt.trace_hybrid(rays, screen, tracer)
         judged = hrt.judge(
             rays, result.hits, result.resolved, hits, scene, camera, pixel=result.pixel
         )
-        if hrt.techniques[name].certified:
+        if hrt.TECHNIQUES[name].certified:
             assert (result.hits.prim_id == hits.prim_id).all(), name
         assert len(judged) == len(rays)
 

@@ -6,11 +6,11 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hybrid_rt.techniques.modes import MODES
 
 import hybrid_rt as hrt
 from hybrid_rt_scenes.hard_cases import get_hard_case, grade, hard_case_names, truth
 from naive import triangle as naive
+from support.screens import through
 
 NAMES = hard_case_names()
 
@@ -49,8 +49,8 @@ KNOWN_WRONG = {
     },
 }  # fmt: skip
 EXACT = {"certified"}
-STRICT = [name for name in MODES if name in KNOWN_WRONG]
-THICK = [name for name in MODES if name in ("linear", "dda", "hiz")]
+STRICT = [name for name in hrt.TECHNIQUES if name in KNOWN_WRONG]
+THICK = ["linear", "dda", "hiz"]
 
 
 @functools.cache
@@ -62,23 +62,22 @@ def built(name):
 def graded(mode, name):
     case = built(name)
     # All that certified can prove, and not only what its budgets let it.
-    chosen = hrt.Certified(64, None) if mode == "certified" else MODES[mode]()
+    chosen = (
+        hrt.Certified(max_tests=64, max_steps=None)
+        if mode == "certified"
+        else hrt.TECHNIQUES[mode]()
+    )
     if case.max_steps is not None and hasattr(chosen, "max_steps"):
         chosen = dataclasses.replace(chosen, max_steps=case.max_steps)
-    pyramid = hrt.build_depth_pyramid(case.gbuffer)
-    return grade(case, hrt.march(case.rays, case.gbuffer, pyramid, chosen), exact=mode in EXACT)
+    return grade(case, through(case.rays, case.gbuffer, chosen), exact=mode in EXACT)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_certified_is_right_from_lists_of_another_view(name):
     case = built(name)
-    camera = case.camera
-    coarse = camera.resized(-(-camera.width // 4), -(-camera.height // 4))
-    mode = hrt.Certified(max_steps=case.max_steps)
-    for view in (coarse, camera.widened(1.5)):
-        gbuffer = hrt.rasterize(case.scene, camera, lists=8, lists_camera=view)
-        pyramid = hrt.build_depth_pyramid(gbuffer, conservative=True)
-        result = grade(case, hrt.march(case.rays, gbuffer, pyramid, mode), exact=True)
+    for form in ({"cell": 4}, {"guard": 1.5}):
+        technique = hrt.Certified(max_steps=case.max_steps, **form)
+        result = grade(case, through(case.rays, case.gbuffer, technique), exact=True)
         assert result.passed, result
 
 

@@ -17,11 +17,6 @@ def random_scene(rng, n, *, spread=3.0, sliver=0.3):
     return hrt.Scene.from_arrays(corner.reshape(-1, 3), np.arange(3 * n).reshape(n, 3))
 
 
-def prepare(scene, camera, lists=4, lists_camera=None):
-    gbuffer = hrt.rasterize(scene, camera, lists=lists, lists_camera=lists_camera)
-    return gbuffer, hrt.build_depth_pyramid(gbuffer, conservative=True)
-
-
 def random_rays(rng, scene, camera, n):
     """Return rays from visible surfaces and from anywhere before the camera, some with limits."""
     gbuffer = hrt.rasterize(scene, camera)
@@ -43,13 +38,11 @@ def random_rays(rng, scene, camera, n):
     return hrt.Rays.from_arrays(origin, direction, None, t_near, t_far)
 
 
-def other_views(camera):
-    """Return views in whose pixels lists can be made: coarse, wide, both, from another eye."""
-    eye = np.add(camera.eye, (0.3, 0.1, -0.5))
-    return (
-        camera.resized(max(1, camera.width // 4), max(1, camera.height // 4)),
-        camera.widened(2.0),
-        camera.widened(1.7).resized(5, 9),
-        camera.resized(1, 1),
-        hrt.Camera.look_at(eye, (0, 0.4, -1), vfov_deg=100, width=31, height=18, near=0.02),
-    )
+FORMS = (
+    {"cell": 4},
+    {"guard": 2.0},
+    {"cell": 3, "guard": 1.7},
+    {"cell": 64},
+    {"cell": 2, "guard": 8.0},
+)
+"""Lists in other pixels than those of the screen: coarse, wide, both, one for everything."""

@@ -5,9 +5,9 @@ import numpy as np
 import hybrid_rt as hrt
 
 
-def any_scene():
-    """Return a scene of one triangle, for tests that never look at the geometry."""
-    return hrt.Scene.from_arrays(np.eye(3, dtype=np.float32), [[0, 1, 2]])
+def any_scene(faces=1):
+    """Return a scene of one triangle, many times, for tests that never look at the geometry."""
+    return hrt.Scene.from_arrays(np.eye(3, dtype=np.float32), np.tile([0, 1, 2], (faces, 1)))
 
 
 def gbuffer(depth, ddx=None, ddy=None, *, vfov_deg=60.0, near=0.1, camera=None):
@@ -25,7 +25,7 @@ def gbuffer(depth, ddx=None, ddy=None, *, vfov_deg=60.0, near=0.1, camera=None):
         zeros if ddx is None else np.ascontiguousarray(ddx, np.float32),
         zeros if ddy is None else np.ascontiguousarray(ddy, np.float32),
         prim_id,
-        any_scene(),
+        any_scene(max(1, int(prim_id.max()) + 1)),
         camera,
     )
 

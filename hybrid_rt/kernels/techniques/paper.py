@@ -23,14 +23,16 @@ from hybrid_rt.kernels.techniques.screen import (
 
 
 @called
-def tilted_plane_s(
-    i, j, depth, ddx, ddy, x0, y0, z0, dx, dy, dz, inv_x, inv_y, step_x, step_y, s_start, s_end
-):
+def tilted_plane_s(i, j, buffers, line, axes, s_start, s_end):
     """Return the s at which the ray meets the plane of pixel (i, j) inside that pixel, or -1.
 
     The pixel is the plane ``depth + ddx (x - i - 1/2) + ddy (y - j - 1/2)``; the ray must reach it
-    from the observer's side. Paper: "Correct".
+    from the observer's side. `line`: its start and deltas on the screen; `axes`: see `screen.axis`.
+    Paper: "Correct".
     """
+    depth, ddx, ddy, _ = buffers
+    x0, y0, z0, dx, dy, dz = line
+    inv_x, inv_y, step_x, step_y = axes
     centre = depth[j, i]
     if centre <= F0:
         return np.float32(-1.0)
@@ -64,12 +66,11 @@ class PaperNumbers(NamedTuple):
 @marches(PaperNumbers)
 def paper_ray(numbers, buffers, pyramid, ray, own_x, own_y, steps_by_level):
     """March one ray, as `driver.march_ray`."""
-    depth, ddx, ddy, _ = buffers
     cells, offsets, pitches = pyramid
     x, y, z0 = np.float32(ray.x), np.float32(ray.y), np.float32(ray.depth)
     dx, dy, dz = np.float32(ray.dx), np.float32(ray.dy), np.float32(ray.dz)
     s_end = np.float32(ray.s_end)
-    height, width = depth.shape
+    height, width = buffers.depth.shape
     top = offsets.shape[0] - 1
     inv_x, bias_x, step_x, far_x = axis(dx)
     inv_y, bias_y, step_y, far_y = axis(dy)
@@ -120,50 +121,16 @@ def paper_ray(numbers, buffers, pyramid, ray, own_x, own_y, steps_by_level):
         else:
             break
     hit_x, hit_y = cx, cy
-    hit = tilted_plane_s(
-        hit_x,
-        hit_y,
-        depth,
-        ddx,
-        ddy,
-        x,
-        y,
-        z0,
-        dx,
-        dy,
-        dz,
-        inv_x,
-        inv_y,
-        step_x,
-        step_y,
-        F0,
-        s_end,
-    )
+    line = x, y, z0, dx, dy, dz
+    axes = inv_x, inv_y, step_x, step_y
+    hit = tilted_plane_s(hit_x, hit_y, buffers, line, axes, F0, s_end)
     if hit < F0 and s > F0:
         if from_x:
             hit_x -= step_x
         else:
             hit_y -= step_y
         if not (hit_x == own_x and hit_y == own_y):
-            hit = tilted_plane_s(
-                hit_x,
-                hit_y,
-                depth,
-                ddx,
-                ddy,
-                x,
-                y,
-                z0,
-                dx,
-                dy,
-                dz,
-                inv_x,
-                inv_y,
-                step_x,
-                step_y,
-                F0,
-                s_end,
-            )
+            hit = tilted_plane_s(hit_x, hit_y, buffers, line, axes, F0, s_end)
     if hit < F0:
         return HIDDEN, False, -1, -1, F0, s, steps
     return HIT, True, hit_x, hit_y, hit, min(s, hit), steps

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
+from support.screens import through
 
 
 class Rectangles:
@@ -101,7 +102,7 @@ def test_answers_of_the_march_are_those_of_the_closed_form(view):
     place, _, buffer = view
     rays = hrt.mirror_rays(buffer)
     t, which = place.first_hit(rays)
-    marched = hrt.march(rays, buffer, hrt.build_depth_pyramid(buffer))
+    marched = through(rays, buffer)
     hit = marched.resolved
     assert hit.mean() > 0.1
     right = marched.prim_id // 2 == which
@@ -130,7 +131,7 @@ def test_a_ball_on_a_floor_is_reflected_where_the_quadratic_says():
     a, b, c = (d * d).sum(axis=1), (o * d).sum(axis=1), (o * o).sum(axis=1) - 1
     with np.errstate(invalid="ignore"):
         t = (-b - np.sqrt(b * b - a * c)) / a
-    marched = hrt.march(rays, buffer, hrt.build_depth_pyramid(buffer))
+    marched = through(rays, buffer)
     on_ball = marched.resolved & (marched.prim_id >= 2)
     assert on_ball.sum() > 1000
     # The ball's facets lie up to 0.0011 inside the sphere, which a slanting ray sees enlarged.

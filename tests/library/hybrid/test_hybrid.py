@@ -5,6 +5,7 @@ import pytest
 
 import hybrid_rt as hrt
 from hybrid_rt.kernels.hybrid import CHUNK, answer_hits
+from support.screens import through
 
 S = hrt.MarchStatus
 
@@ -28,15 +29,15 @@ def room():
 def case():
     scene, buffer = room()
     rays = hrt.mirror_rays(buffer)
-    return scene, buffer, rays, hrt.build_depth_pyramid(buffer), hrt.EmbreeTracer(scene)
+    return scene, buffer, rays, hrt.EmbreeTracer(scene)
 
 
 @pytest.mark.parametrize("mode", ["paper", "linear", "dda", "hiz", "slope"])
 def test_resolved_rays_from_the_march_the_others_from_the_tracer(case, mode):
-    _scene, buffer, rays, pyramid, tracer = case
+    _scene, buffer, rays, tracer = case
     assert len(rays) > 3 * CHUNK  # more than one chunk is put together
-    marched = hrt.march(rays, buffer, pyramid, mode)
-    result = hrt.trace_hybrid(rays, buffer, pyramid, tracer, mode)
+    marched = through(rays, buffer, mode)
+    result = hrt.trace_hybrid(rays, hrt.prepare(buffer, mode), tracer)
     resolved = marched.resolved
     assert 0.1 < resolved.mean() < 0.9
     np.testing.assert_array_equal(result.resolved, resolved)
@@ -53,8 +54,8 @@ def test_resolved_rays_from_the_march_the_others_from_the_tracer(case, mode):
 
 
 def test_answers_of_the_march_are_complete_hits(case):
-    scene, buffer, rays, pyramid, tracer = case
-    result = hrt.trace_hybrid(rays, buffer, pyramid, tracer)
+    scene, buffer, rays, tracer = case
+    result = hrt.trace_hybrid(rays, hrt.prepare(buffer, "paper"), tracer)
     hits, r = result.hits, result.resolved
     a, b, c = (scene.vertices[scene.faces[hits.prim_id[r], k]].astype(float) for k in range(3))
     normal = np.cross(b - a, c - a)
@@ -82,7 +83,7 @@ def answered(resolved, rays, prim, distance, scene):
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.6, 1.0])
 @pytest.mark.parametrize("n", [1, 7, 16, 33, 1000, CHUNK + 5])
 def test_rows_of_resolved_rays_are_written_and_no_others(case, n, share):
-    scene, _buffer, rays, _pyramid, _tracer = case
+    scene, _buffer, rays, _tracer = case
     rng = np.random.default_rng(n)
     rays = rays.take(np.arange(n))
     resolved = rng.random(n) < share
@@ -99,8 +100,8 @@ def test_rows_of_resolved_rays_are_written_and_no_others(case, n, share):
 
 
 def test_most_answers_of_the_march_agree_with_the_tracer(case):
-    scene, buffer, rays, pyramid, tracer = case
-    result = hrt.trace_hybrid(rays, buffer, pyramid, tracer)
+    scene, buffer, rays, tracer = case
+    result = hrt.trace_hybrid(rays, hrt.prepare(buffer, "paper"), tracer)
     reference = hrt.BruteForceTracer(scene).intersect(rays)
     same = result.hits.prim_id == reference.prim_id
     assert same.mean() > 0.98
@@ -108,32 +109,32 @@ def test_most_answers_of_the_march_agree_with_the_tracer(case):
 
 
 def test_the_number_of_threads_changes_nothing(case):
-    _scene, buffer, rays, pyramid, tracer = case
-    one = hrt.trace_hybrid(rays, buffer, pyramid, tracer, threads=1)
-    two = hrt.trace_hybrid(rays, buffer, pyramid, tracer)
+    _scene, buffer, rays, tracer = case
+    one = hrt.trace_hybrid(rays, hrt.prepare(buffer, "paper"), tracer, threads=1)
+    two = hrt.trace_hybrid(rays, hrt.prepare(buffer, "paper"), tracer)
     for name in ("t", "prim_id", "u", "v", "n_g"):
         np.testing.assert_array_equal(getattr(one.hits, name), getattr(two.hits, name))
 
 
 def test_rays_that_all_fall_back_and_rays_that_all_resolve(case):
-    _scene, buffer, rays, pyramid, tracer = case
-    resolved = hrt.march(rays, buffer, pyramid).resolved
+    _scene, buffer, rays, tracer = case
+    resolved = through(rays, buffer).resolved
     for part, share in ((rays.take(resolved), 1.0), (rays.take(~resolved), 0.0)):
-        result = hrt.trace_hybrid(part, buffer, pyramid, tracer)
+        result = hrt.trace_hybrid(part, hrt.prepare(buffer, "paper"), tracer)
         assert result.resolved.mean() == share
         assert len(result.hits) == len(part)
 
 
 def test_no_rays(case):
-    _scene, buffer, rays, pyramid, tracer = case
-    result = hrt.trace_hybrid(rays.take(np.zeros(0, int)), buffer, pyramid, tracer)
+    _scene, buffer, rays, tracer = case
+    result = hrt.trace_hybrid(rays.take(np.zeros(0, int)), hrt.prepare(buffer, "paper"), tracer)
     assert len(result.hits) == 0
 
 
 def test_invalid_rays_hit_nothing(case):
-    _scene, buffer, _rays, pyramid, tracer = case
+    _scene, buffer, _rays, tracer = case
     bad = hrt.Rays.from_arrays([[0, 0, 0]] * 3, [[0, 0, 0], [np.nan, 0, 1], [0, np.inf, 0]])
-    result = hrt.trace_hybrid(bad, buffer, pyramid, tracer)
+    result = hrt.trace_hybrid(bad, hrt.prepare(buffer, "paper"), tracer)
     assert (result.status == S.INVALID).all()
     assert (result.hits.prim_id == -1).all()
     assert np.isinf(result.hits.t).all()
@@ -143,18 +144,18 @@ def test_invalid_rays_hit_nothing(case):
 def certain():
     scene, _ = room()
     camera = hrt.Camera.look_at((0, 0.4, 2.5), (0, 0, 0), width=160, height=120, near=0.05)
-    buffer = hrt.rasterize(scene, camera, lists=4)
-    rays = hrt.mirror_rays(buffer)
-    pyramid = hrt.build_depth_pyramid(buffer, conservative=True)
-    return scene, buffer, rays, pyramid, hrt.EmbreeTracer(scene)
+    buffer = hrt.rasterize(scene, camera)
+    return scene, buffer, hrt.mirror_rays(buffer), hrt.EmbreeTracer(scene)
 
 
 @pytest.mark.parametrize(
     "parameters", [{"hand_over": False}, {"hand_over": True}, {"probes": 2}, {"vectors": False}]
 )
 def test_certified_is_the_tracer_ties_apart(certain, parameters):
-    scene, buffer, rays, pyramid, tracer = certain
-    result = hrt.trace_hybrid(rays, buffer, pyramid, tracer, hrt.Certified(**parameters))
+    scene, buffer, rays, tracer = certain
+    result = hrt.trace_hybrid(
+        rays, hrt.prepare(buffer, hrt.Certified(lists=4, **parameters)), tracer
+    )
     assert 0.2 < result.resolved.mean() < 0.95
     reference = tracer.intersect(rays)
     everything = np.ones(len(rays), bool)
@@ -171,21 +172,23 @@ class OnlyIntersects:
     """A tracer that takes no indices."""
 
     def __init__(self, tracer):
-        self.intersect = tracer.intersect
+        self.scene, self.intersect = tracer.scene, tracer.intersect
 
 
-@pytest.mark.parametrize("mode", ["paper", hrt.Certified(probes=4), hrt.Certified()])
+@pytest.mark.parametrize(
+    "mode", ["paper", hrt.Certified(lists=4, probes=4), hrt.Certified(lists=4)]
+)
 def test_a_tracer_that_writes_in_place_and_one_that_does_not_give_the_same(
     case, certain, mode, monkeypatch
 ):
-    _scene, buffer, rays, pyramid, tracer = case if mode == "paper" else certain
-    slow = hrt.trace_hybrid(rays, buffer, pyramid, OnlyIntersects(tracer), mode)
+    _scene, buffer, rays, tracer = case if mode == "paper" else certain
+    slow = hrt.trace_hybrid(rays, hrt.prepare(buffer, mode), OnlyIntersects(tracer))
 
     def no_copy(rays, index):
         raise AssertionError("rays were copied")
 
     monkeypatch.setattr(hrt.Rays, "take", no_copy)
-    fast = hrt.trace_hybrid(rays, buffer, pyramid, tracer, mode)
+    fast = hrt.trace_hybrid(rays, hrt.prepare(buffer, mode), tracer)
     assert 0.1 < fast.resolved.mean() < 0.95
     for name in ("t", "prim_id", "u", "v", "n_g"):
         np.testing.assert_array_equal(getattr(fast.hits, name), getattr(slow.hits, name))
@@ -193,17 +196,19 @@ def test_a_tracer_that_writes_in_place_and_one_that_does_not_give_the_same(
 
 
 def test_hand_over_starts_rays_later_and_before_their_hit(certain):
-    _scene, buffer, rays, pyramid, tracer = certain
+    _scene, buffer, rays, tracer = certain
     starts = []
 
     class Recorder:
+        scene = tracer.scene
+
         def intersect(self, rest):
             starts.append(rest)
             return tracer.intersect(rest)
 
     for hand_over in (False, True):
-        mode = hrt.Certified(hand_over=hand_over)
-        result = hrt.trace_hybrid(rays, buffer, pyramid, Recorder(), mode)
+        mode = hrt.Certified(lists=4, hand_over=hand_over)
+        result = hrt.trace_hybrid(rays, hrt.prepare(buffer, mode), Recorder())
     own, handed = starts
     left = rays.take(~result.resolved)
     np.testing.assert_array_equal(own.t_near, left.t_near)
@@ -215,6 +220,6 @@ def test_hand_over_starts_rays_later_and_before_their_hit(certain):
 
 
 def test_an_unknown_mode(case):
-    _scene, buffer, rays, pyramid, tracer = case
-    with pytest.raises(hrt.ArgumentError, match="mode: expected one of 'paper'"):
-        hrt.trace_hybrid(rays, buffer, pyramid, tracer, mode="psychic")
+    _scene, buffer, rays, tracer = case
+    with pytest.raises(hrt.UnknownNameError, match="unknown technique 'psychic'"):
+        hrt.trace_hybrid(rays, hrt.prepare(buffer, "psychic"), tracer)

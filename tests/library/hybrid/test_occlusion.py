@@ -6,6 +6,7 @@ import pytest
 
 import hybrid_rt as hrt
 from hybrid_rt.kernels.hybrid import CHUNK
+from support.screens import through
 
 
 @pytest.fixture(scope="module")
@@ -42,10 +43,10 @@ MAKERS = [ambient, lamp, panel]
 @pytest.mark.parametrize("make", MAKERS)
 def test_resolved_rays_from_the_march_the_others_from_the_tracer(room, make):
     scene, buffer = room
-    rays, pyramid, tracer = make(buffer), hrt.build_depth_pyramid(buffer), hrt.EmbreeTracer(scene)
+    rays, tracer = make(buffer), hrt.EmbreeTracer(scene)
     assert len(rays) > 2 * CHUNK  # more than one chunk is put together
-    marched = hrt.march(rays, buffer, pyramid, any_hit=True)
-    result = hrt.occluded_hybrid(rays, buffer, pyramid, tracer)
+    marched = through(rays, buffer, any_hit=True)
+    result = hrt.occluded_hybrid(rays, hrt.prepare(buffer, "paper"), tracer)
     resolved = marched.resolved
     assert 0.02 < resolved.mean() < 0.9
     assert result.occluded.dtype == np.bool_
@@ -61,10 +62,10 @@ def test_resolved_rays_from_the_march_the_others_from_the_tracer(room, make):
 @pytest.mark.parametrize("make", MAKERS)
 def test_equals_the_tracer_alone_and_brute_force_but_for_the_errors_of_the_paper(room, make):
     scene, buffer = room
-    rays, pyramid = make(buffer), hrt.build_depth_pyramid(buffer)
+    rays = make(buffer)
     embree = hrt.EmbreeTracer(scene)
-    result = hrt.occluded_hybrid(rays, buffer, pyramid, embree)
-    slow = hrt.occluded_hybrid(rays, buffer, pyramid, hrt.BruteForceTracer(scene))
+    result = hrt.occluded_hybrid(rays, hrt.prepare(buffer, "paper"), embree)
+    slow = hrt.occluded_hybrid(rays, hrt.prepare(buffer, "paper"), hrt.BruteForceTracer(scene))
     truth = hrt.BruteForceTracer(scene).occluded(rays)
     assert 0.02 < truth.mean() < 0.98
     assert (embree.occluded(rays) != truth).mean() < 1e-4
@@ -94,8 +95,7 @@ def test_every_answer_goes_to_its_own_ray(room):
     tracer = Counting()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("hybrid_rt.hybrid.march", lambda *a, **k: marched)
-        pyramid = hrt.build_depth_pyramid(buffer)
-        result = hrt.occluded_hybrid(rays, buffer, pyramid, tracer)
+        result = hrt.occluded_hybrid(rays, hrt.prepare(buffer, "paper"), tracer)
     np.testing.assert_array_equal(tracer.asked.direction, rays.direction[~resolved])
     expected = np.where(resolved, prim >= 0, np.arange(n) % 2 == 1)
     np.testing.assert_array_equal(result.occluded, expected)
@@ -103,11 +103,11 @@ def test_every_answer_goes_to_its_own_ray(room):
 
 def test_the_same_for_any_number_of_threads(room):
     scene, buffer = room
-    rays, pyramid = ambient(buffer), hrt.build_depth_pyramid(buffer)
+    rays = ambient(buffer)
     tracer = hrt.EmbreeTracer(scene)
-    one = hrt.occluded_hybrid(rays, buffer, pyramid, tracer, threads=1)
+    one = hrt.occluded_hybrid(rays, hrt.prepare(buffer, "paper"), tracer, threads=1)
     threads = numba.get_num_threads()
-    more = hrt.occluded_hybrid(rays, buffer, pyramid, tracer, threads=threads)
+    more = hrt.occluded_hybrid(rays, hrt.prepare(buffer, "paper"), tracer, threads=threads)
     np.testing.assert_array_equal(one.occluded, more.occluded)
     np.testing.assert_array_equal(one.status, more.status)
     assert numba.get_num_threads() == threads
@@ -115,31 +115,31 @@ def test_the_same_for_any_number_of_threads(room):
 
 def test_no_rays_and_all_rays_unresolved(room):
     scene, buffer = room
-    pyramid, tracer = hrt.build_depth_pyramid(buffer), hrt.EmbreeTracer(scene)
-    none = hrt.occluded_hybrid(ambient(buffer).take([]), buffer, pyramid, tracer)
+    tracer = hrt.EmbreeTracer(scene)
+    none = hrt.occluded_hybrid(ambient(buffer).take([]), hrt.prepare(buffer, "paper"), tracer)
     assert (len(none.occluded), len(none.resolved)) == (0, 0)
     rays = ambient(buffer).take(np.arange(50))
-    exhausted = hrt.occluded_hybrid(rays, buffer, pyramid, tracer, hrt.Paper(max_steps=1))
+    exhausted = hrt.occluded_hybrid(rays, hrt.prepare(buffer, hrt.Paper(max_steps=1)), tracer)
     np.testing.assert_array_equal(exhausted.occluded, tracer.occluded(rays))
 
 
 def test_any_hit_changes_nothing_in_the_march_of_the_paper(room):
     _, buffer = room
-    rays, pyramid = ambient(buffer), hrt.build_depth_pyramid(buffer)
-    a, b = (hrt.march(rays, buffer, pyramid, any_hit=any_hit) for any_hit in (False, True))
+    rays = ambient(buffer)
+    a, b = (through(rays, buffer, any_hit=any_hit) for any_hit in (False, True))
     for name in ("status", "resolved", "pixel", "prim_id", "t", "t_free", "steps"):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
 
 
 def test_bad_input_is_named(room):
     scene, buffer = room
-    rays, pyramid = ambient(buffer), hrt.build_depth_pyramid(buffer)
+    rays = ambient(buffer)
     tracer = hrt.EmbreeTracer(scene)
     with pytest.raises(hrt.ArgumentError, match=r"^rays: expected a Rays"):
-        hrt.occluded_hybrid(None, buffer, pyramid, tracer)
-    with pytest.raises(hrt.ArgumentError, match=r"^mode: expected one of"):
-        hrt.occluded_hybrid(rays, buffer, pyramid, tracer, "papr")
+        hrt.occluded_hybrid(None, hrt.prepare(buffer, "paper"), tracer)
+    with pytest.raises(hrt.UnknownNameError, match=r"^unknown technique 'papr'"):
+        hrt.occluded_hybrid(rays, hrt.prepare(buffer, "papr"), tracer)
     with pytest.raises(hrt.ArgumentError, match=r"^threads: expected an integer >= 1"):
-        hrt.occluded_hybrid(rays, buffer, pyramid, tracer, threads=0)
+        hrt.occluded_hybrid(rays, hrt.prepare(buffer, "paper"), tracer, threads=0)
     with pytest.raises(hrt.ArgumentError, match=r"^any_hit: expected one of True, False"):
-        hrt.march(rays, buffer, pyramid, any_hit="yes")
+        through(rays, buffer, any_hit="yes")

@@ -812,6 +812,7 @@ print(WIDTH, *hits)
 """
 
 
+@pytest.mark.slow
 def test_code_cached_for_one_machine_serves_it_again_and_no_other(tmp_path):
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
@@ -834,6 +835,7 @@ def test_code_cached_for_one_machine_serves_it_again_and_no_other(tmp_path):
         assert run(dict(os.environ)) == [WIDTH, 1, 1]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif("HYBRID_RT_TEST_WIDTH" in os.environ, reason="this is the other machine")
 @pytest.mark.parametrize("name", MACHINES)
 def test_all_of_this_on_another_machine(name):

@@ -7,11 +7,12 @@ import pytest
 
 import hybrid_rt as hrt
 from naive import lists as naive
+from support.screens import lists_of
 from support.soup import random_scene
 
 
 def assert_conservative(scene, camera, length, pixels):
-    found = hrt.rasterize(scene, camera, lists=length).lists
+    found = lists_of(scene, camera, length)
     wanted = naive.lists(scene.vertices, scene.faces, camera, found.margin_px, pixels)
     for (i, j), touching in wanted.items():
         ids = found.prim_id[j, i]
@@ -64,7 +65,7 @@ def test_descending_and_padded():
     rng = np.random.default_rng(5)
     scene = random_scene(rng, 150)
     camera = hrt.Camera.look_at((0, 0, 5), (0, 0, 0), width=40, height=30, near=0.1)
-    found = hrt.rasterize(scene, camera, lists=4).lists
+    found = lists_of(scene, camera, 4)
     assert found.length == 4
     assert found.nbytes == 40 * 30 * (8 * 4 + 4) + 150 * 32
     assert (np.diff(found.nearest, axis=2) <= 0).all()
@@ -77,23 +78,23 @@ def test_the_first_bound_is_never_behind_the_visible_surface():
     rng = np.random.default_rng(6)
     scene = random_scene(rng, 60)
     camera = hrt.Camera.look_at((0, 0, 5), (0, 0, 0), width=64, height=48, near=0.1)
-    gbuffer = hrt.rasterize(scene, camera, lists=2)
-    assert (gbuffer.lists.nearest[:, :, 0] >= gbuffer.depth).all()
+    gbuffer = hrt.rasterize(scene, camera)
+    assert (lists_of(scene, camera, 2).nearest[:, :, 0] >= gbuffer.depth).all()
 
 
 def test_a_triangle_that_misses_every_centre_is_listed():
     camera = hrt.Camera.look_at((0, 0, 0), (0, 0, -1), vfov_deg=90, width=8, height=8, near=0.1)
     # x_px = 4 + 4 x / z: a speck inside of pixel (5, 4), beside its centre.
     corners = np.array([(1.1, -0.6, -4), (1.12, -0.6, -4), (1.1, -0.62, -4)])
-    gbuffer = hrt.rasterize(hrt.Scene.from_arrays(corners, [[0, 1, 2]]), camera, lists=1)
-    assert (gbuffer.prim_id == -1).all()
-    assert np.argwhere(gbuffer.lists.prim_id[:, :, 0] == 0).tolist() == [[4, 5]]
+    scene = hrt.Scene.from_arrays(corners, [[0, 1, 2]])
+    assert (hrt.rasterize(scene, camera).prim_id == -1).all()
+    assert np.argwhere(lists_of(scene, camera, 1).prim_id[:, :, 0] == 0).tolist() == [[4, 5]]
 
 
 def test_a_triangle_across_the_near_plane_is_listed_as_near_as_it_comes():
     camera = hrt.Camera.look_at((0, 0, 0), (0, 0, -1), vfov_deg=90, width=8, height=8, near=0.1)
     floor = np.array([(-50.0, -0.05, 50), (50, -0.05, 50), (0, -0.05, -100)])
-    found = hrt.rasterize(hrt.Scene.from_arrays(floor, [[0, 1, 2]]), camera, lists=1).lists
+    found = lists_of(hrt.Scene.from_arrays(floor, [[0, 1, 2]]), camera, 1)
     # y_px = 4 + 4 * 0.05 / z: the floor is seen from row 4 (far) to y = 6 (at the near plane).
     assert found.prim_id[5, 3, 0] == 0
     assert found.nearest[5, 3, 0] == pytest.approx(1.0, rel=1e-5)
@@ -104,7 +105,7 @@ def test_a_corner_that_rounding_may_put_on_either_side_of_the_near_plane_loses_n
     camera = hrt.Camera.look_at((0, 0, 0), (0, 0, -1), vfov_deg=90, width=8, height=8, near=1.0)
     close = 1 - 2.0**-20  # where the lists put the near plane; a float32
     corners = np.array([(-1.0, -1, -2), (1, -1, -2), (0, 0.5, -close)])
-    found = hrt.rasterize(hrt.Scene.from_arrays(corners, [[0, 1, 2]]), camera, lists=1).lists
+    found = lists_of(hrt.Scene.from_arrays(corners, [[0, 1, 2]]), camera, 1)
     assert found.prim_id[4, 4, 0] == 0
     assert found.prim_id[5, 3, 0] == 0
 
@@ -112,7 +113,7 @@ def test_a_corner_that_rounding_may_put_on_either_side_of_the_near_plane_loses_n
 def test_a_plane_through_the_eye_is_bounded_by_its_box():
     camera = hrt.Camera.look_at((0, 0, 0), (0, 0, -1), vfov_deg=90, width=8, height=8, near=0.1)
     edge_on = np.array([(-1.0, 0, -2), (1, 0, -2), (0, 0, -4)])
-    found = hrt.rasterize(hrt.Scene.from_arrays(edge_on, [[0, 1, 2]]), camera, lists=1).lists
+    found = lists_of(hrt.Scene.from_arrays(edge_on, [[0, 1, 2]]), camera, 1)
     rows = np.flatnonzero((found.prim_id[:, :, 0] == 0).any(axis=1))
     assert rows.tolist() == [3, 4]
     assert found.nearest.max() == pytest.approx(0.05, rel=1e-5)
@@ -125,11 +126,11 @@ def test_threads_and_batches_change_nothing(monkeypatch):
     rng = np.random.default_rng(8)
     scene = random_scene(rng, 300)
     camera = hrt.Camera.look_at((0, 0, 5), (0, 0, 0), width=100, height=70, near=0.1)
-    one = hrt.rasterize(scene, camera, lists=3, threads=1).lists
+    one = lists_of(scene, camera, 3, threads=1)
     monkeypatch.setattr(module, "BATCH_FACES", 37)
-    many = hrt.rasterize(scene, camera, lists=3, threads=_threads.available()).lists
+    many = lists_of(scene, camera, 3, threads=_threads.available())
     monkeypatch.setattr(module, "BATCH_ENTRIES", 200)
-    split = hrt.rasterize(scene, camera, lists=3).lists
+    split = lists_of(scene, camera, 3)
     for name in ("prim_id", "nearest", "rest"):
         assert np.array_equal(getattr(one, name), getattr(many, name))
         assert np.array_equal(getattr(one, name), getattr(split, name))
@@ -146,8 +147,8 @@ def crowded(seed=9, n=900):
 @pytest.mark.parametrize("length", [1, 3, 7, 8, 20])
 def test_a_shorter_list_is_the_beginning_of_a_longer_one(length):
     scene, camera = crowded()
-    short = hrt.rasterize(scene, camera, lists=length).lists
-    long = hrt.rasterize(scene, camera, lists=64).lists
+    short = lists_of(scene, camera, length)
+    long = lists_of(scene, camera, 64)
     assert (long.nearest[:, :, length] > 0).mean() > 0.3
     assert np.array_equal(short.prim_id, long.prim_id[:, :, :length])
     assert np.array_equal(short.nearest, long.nearest[:, :, :length])
@@ -158,8 +159,8 @@ def test_the_order_of_the_faces_changes_nothing():
     scene, camera = crowded()
     order = np.random.default_rng(1).permutation(len(scene.faces))
     shuffled = hrt.Scene.from_arrays(scene.vertices, scene.faces[order])
-    one = hrt.rasterize(scene, camera, lists=8).lists
-    other = hrt.rasterize(shuffled, camera, lists=8).lists
+    one = lists_of(scene, camera, 8)
+    other = lists_of(shuffled, camera, 8)
     assert np.array_equal(one.nearest, other.nearest)
     assert np.array_equal(one.rest, other.rest)
     # The numbers may differ where bounds are equal.
@@ -176,7 +177,7 @@ def test_of_equal_bounds_the_smaller_number_comes_first(monkeypatch):
     thrice = hrt.Scene.from_arrays(scene.vertices, np.tile(scene.faces, (3, 1)))
     for batch in (1 << 21, 50):
         monkeypatch.setattr(module, "BATCH_FACES", batch)
-        found = hrt.rasterize(thrice, camera, lists=5).lists
+        found = lists_of(thrice, camera, 5)
         equal = (np.diff(found.nearest, axis=2) == 0) & (found.prim_id[:, :, 1:] >= 0)
         assert equal.mean() > 0.1
         assert (np.diff(found.prim_id, axis=2)[equal] > 0).all()
@@ -189,13 +190,5 @@ def test_a_triangle_with_two_equal_corners_is_nothing():
     camera = hrt.Camera.look_at((0, 0, 5), (0, 0, 0), width=16, height=16, near=0.1)
     corners = np.array([(-1.0, 0, 0), (1, 0, 0), (1, 0, 0)])
     for faces in ([0, 1, 2], [0, 1, 1], [1, 1, 1]):
-        found = hrt.rasterize(hrt.Scene.from_arrays(corners, [faces]), camera, lists=1).lists
+        found = lists_of(hrt.Scene.from_arrays(corners, [faces]), camera, 1)
         assert (found.prim_id == -1).all()
-
-
-@pytest.mark.parametrize("lists", [-1, 65, 2.5, "8"])
-def test_bad_length(lists):
-    scene = hrt.Scene.from_arrays(np.eye(3), [[0, 1, 2]])
-    camera = hrt.Camera.look_at((0, 0, 5), (0, 0, 0), width=4, height=4)
-    with pytest.raises(hrt.ArgumentError, match="lists"):
-        hrt.rasterize(scene, camera, lists=lists)

@@ -15,6 +15,7 @@ from hybrid_rt.kernels.raster.lists_planes import (
 )
 from hybrid_rt.kernels.techniques.certified import scalar as kernels
 from naive import lists as naive
+from support.screens import lists_of
 from support.soup import random_scene
 
 F = np.float32
@@ -40,7 +41,7 @@ def planes_case(seed):
         tilt = 10.0 ** -(k + 1) * rng.normal(size=3)
         corners[k, 2] = a + 0.5 * (b - a) + 0.3 * (a - eye) + tilt
     scene = hrt.Scene.from_arrays(corners.reshape(-1, 3), scene.faces)
-    lists = hrt.rasterize(scene, camera, lists=14).lists
+    lists = lists_of(scene, camera, 14)
     matrix, q = camera.pixel_from_world, {}
     for face in range(len(scene)):
         q[face] = [

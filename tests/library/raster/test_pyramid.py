@@ -5,15 +5,7 @@ import pytest
 
 import hybrid_rt as hrt
 from naive import pyramid as naive
-
-
-def gbuffer_of(depth):
-    """Return a G-buffer that holds `depth` and nothing else."""
-    scene = hrt.Scene.from_arrays(np.eye(3), [(0, 1, 2)])
-    height, width = depth.shape
-    camera = hrt.Camera.look_at((0, 0, 3), (0, 0, 0), width=width, height=height)
-    zero = np.zeros_like(depth)
-    return hrt.GBuffer(depth, zero, zero, np.full(depth.shape, -1, np.int32), scene, camera)
+from support import synthetic
 
 
 @pytest.mark.parametrize(
@@ -21,7 +13,7 @@ def gbuffer_of(depth):
 )
 def test_same_as_naive(width, height):
     depth = np.random.default_rng(0).random((height, width), dtype=np.float32)
-    pyramid = hrt.build_depth_pyramid(gbuffer_of(depth))
+    pyramid = hrt.build_depth_pyramid(synthetic.gbuffer(depth))
     levels = naive.pyramid(depth)
     assert len(pyramid) == len(levels)
     assert pyramid.data.dtype == np.float32
@@ -36,7 +28,7 @@ def test_same_as_naive(width, height):
 @pytest.mark.parametrize("build", [hrt.build_depth_pyramid, hrt.build_slope_pyramid])
 def test_levels_lie_where_the_closed_form_says_and_apart(width, height, build):
     depth = np.random.default_rng(0).random((height, width), dtype=np.float32) + np.float32(0.1)
-    pyramid = build(gbuffer_of(depth))
+    pyramid = build(synthetic.gbuffer(depth))
     a, b = (int(np.ceil(np.log2(n))) for n in (width, height))
     owners = np.zeros(len(pyramid.data), int)
     for index in range(len(pyramid)):
@@ -56,8 +48,8 @@ def test_levels_lie_where_the_closed_form_says_and_apart(width, height, build):
 def test_threads_change_nothing_and_the_input_stays():
     depth = np.random.default_rng(1).random((301, 203), dtype=np.float32)
     before = depth.copy()
-    one = hrt.build_depth_pyramid(gbuffer_of(depth), threads=1)
-    all_ = hrt.build_depth_pyramid(gbuffer_of(depth))
+    one = hrt.build_depth_pyramid(synthetic.gbuffer(depth), threads=1)
+    all_ = hrt.build_depth_pyramid(synthetic.gbuffer(depth))
     for index in range(len(one)):
         assert np.array_equal(one.level(index), all_.level(index))
     assert np.array_equal(depth, before)
@@ -68,4 +60,4 @@ def test_bad_arguments_are_named():
     with pytest.raises(hrt.ArgumentError, match="gbuffer: expected a GBuffer"):
         hrt.build_depth_pyramid(depth)
     with pytest.raises(hrt.ArgumentError, match="threads"):
-        hrt.build_depth_pyramid(gbuffer_of(depth), threads=-1)
+        hrt.build_depth_pyramid(synthetic.gbuffer(depth), threads=-1)

@@ -5,8 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybrid_rt as hrt
-
-SCENE = hrt.Scene.from_arrays(np.eye(3), [(0, 1, 2)])
+from support import synthetic
 
 
 @settings(deadline=None, max_examples=60)
@@ -15,9 +14,7 @@ def test_a_cell_is_the_nearest_of_its_children(width, height, seed):
     rng = np.random.default_rng(seed)
     depth = rng.random((height, width), dtype=np.float32) * (rng.random((height, width)) < 0.7)
     depth = depth.astype(np.float32)
-    camera = hrt.Camera.look_at((0, 0, 3), (0, 0, 0), width=width, height=height)
-    prim_id = np.full(depth.shape, -1, np.int32)
-    pyramid = hrt.build_depth_pyramid(hrt.GBuffer(depth, depth, depth, prim_id, SCENE, camera))
+    pyramid = hrt.build_depth_pyramid(synthetic.gbuffer(depth, depth, depth))
     assert np.array_equal(pyramid.level(0), depth)
     for index in range(1, len(pyramid)):
         below, level = pyramid.level(index - 1), pyramid.level(index)

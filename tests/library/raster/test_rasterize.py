@@ -288,7 +288,7 @@ def test_threads_change_nothing_and_inputs_stay():
 PROGRAM = """
 import sys
 import numpy as np
-from unit.test_raster import CHANNELS, everywhere
+from library.raster.test_rasterize import CHANNELS, everywhere
 
 gbuffer = everywhere()
 np.savez(sys.argv[1], **{name: getattr(gbuffer, name) for name in CHANNELS})
@@ -307,6 +307,7 @@ def everywhere():
     return hrt.rasterize(scene, camera)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MACHINES)
 def test_the_same_on_another_machine(name, tmp_path):
     env, _ = machine(name)

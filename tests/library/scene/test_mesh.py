@@ -100,7 +100,7 @@ def test_inputs_are_not_written():
     rays = hrt.mirror_rays(buffer)
     held = [buffer.depth, buffer.prim_id, rays.origin, rays.direction, rays.t_near, rays.t_far]
     copies = [a.copy() for a in held]
-    hrt.trace_hybrid(rays, buffer, hrt.build_depth_pyramid(buffer), hrt.EmbreeTracer(scene))
+    hrt.trace_hybrid(rays, hrt.prepare(buffer, "paper"), hrt.EmbreeTracer(scene))
     np.testing.assert_array_equal(vertices, before[0])
     np.testing.assert_array_equal(faces, before[1])
     for a, b in zip(held, copies, strict=True):

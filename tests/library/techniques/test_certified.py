@@ -1,11 +1,14 @@
 """The certified march: every answer against exact arithmetic, and what it must leave unanswered."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import hybrid_rt as hrt
 from naive import triangle as exact
-from support.soup import other_views, prepare, random_rays, random_scene
+from support.screens import through
+from support.soup import FORMS, random_rays, random_scene
 
 S = hrt.MarchStatus
 
@@ -17,9 +20,9 @@ def kernel(request, monkeypatch):
         monkeypatch.setattr("hybrid_rt.techniques.certified._countable", lambda *_: False)
 
 
-def certified(scene, camera, rays, lists=4, mode="certified", **kwargs):
-    gbuffer, pyramid = prepare(scene, camera, lists)
-    return hrt.march(rays, gbuffer, pyramid, mode, **kwargs)
+def certified(scene, camera, rays, lists=4, *, any_hit=False, **parameters):
+    technique = hrt.Certified(lists=lists, **parameters)
+    return through(rays.detached(), hrt.rasterize(scene, camera), technique, any_hit=any_hit)
 
 
 def triangles(scene):
@@ -77,17 +80,16 @@ def test_every_answer_from_lists_of_another_view_is_the_exact_one(seed):
     scene = random_scene(rng, 24)
     camera = hrt.Camera.look_at((0.1, 0.2, 5), (0.2, 0, -1), vfov_deg=50, width=24, height=16)
     rays = random_rays(rng, scene, camera, 150)
-    view = other_views(camera)[seed % 5]
-    gbuffer, pyramid = prepare(scene, camera, (2, 16)[seed % 2], view)
-    assert gbuffer.lists.camera == view
-    assert pyramid.level(0).shape == (view.height, view.width)
-    marched = hrt.march(rays, gbuffer, pyramid, "certified")
+    technique = hrt.Certified(lists=(2, 16)[seed % 2], **FORMS[seed % 5])
+    screen = hrt.prepare(hrt.rasterize(scene, camera), technique)
+    view = screen.data.lists.camera
+    assert view == technique.lists_camera(camera) != camera
+    assert screen.data.pyramid.level(0).shape == (view.height, view.width)
+    marched = hrt.march(rays, screen)
     assert_true(scene, rays, marched)
     assert marched.resolved.any()
     assert (marched.pixel == -1).all()
-    plain = hrt.rasterize(scene, camera)
-    assert np.array_equal(gbuffer.depth, plain.depth)
-    result = hrt.trace_hybrid(rays, gbuffer, pyramid, hrt.BruteForceTracer(scene), "certified")
+    result = hrt.trace_hybrid(rays, screen, hrt.BruteForceTracer(scene))
     assert_true(scene, rays, result.marched)
     assert np.array_equal(result.hits.prim_id, hrt.BruteForceTracer(scene).intersect(rays).prim_id)
 
@@ -99,24 +101,25 @@ def test_a_guard_band_keeps_rays_in_sight_that_leave_the_screen():
     rays = hrt.mirror_rays(hrt.rasterize(scene, camera))
     gone, alpha = [], []
     for factor in (1.0, 2.0, 4.0):
-        gbuffer, pyramid = prepare(scene, camera, 16, camera.widened(factor))
-        marched = hrt.march(rays, gbuffer, pyramid, "certified")
+        marched = certified(scene, camera, rays, 16, guard=factor)
         gone.append((marched.status == S.OFFSCREEN).mean())
         alpha.append(marched.resolved.mean())
     assert gone[0] > gone[1] > gone[2]
     assert alpha[0] < alpha[1] < alpha[2]
 
 
-def test_lists_of_another_view_that_cannot_be():
-    scene = scene_of(wall())
-    with pytest.raises(hrt.ArgumentError, match="lists_camera: expected None where lists is 0"):
-        hrt.rasterize(scene, CAMERA, lists_camera=CAMERA)
-    with pytest.raises(hrt.ArgumentError, match="lists_camera: expected a Camera"):
-        hrt.rasterize(scene, CAMERA, lists=4, lists_camera="wide")
-    gbuffer, pyramid = prepare(scene, CAMERA, 4, CAMERA.resized(8, 4))
+def test_a_screen_is_marched_by_those_that_read_the_same():
+    gbuffer = hrt.rasterize(scene_of(wall()), CAMERA)
     rays = hrt.mirror_rays(gbuffer)
-    with pytest.raises(hrt.ArgumentError, match="of the G-buffer's lists, 16 by 16 pixels"):
-        hrt.march(rays, hrt.rasterize(scene, CAMERA, lists=4), pyramid, "certified")
+    screen = hrt.prepare(gbuffer, hrt.Certified(cell=2))
+    other = screen.of(hrt.Certified(cell=2, max_tests=1, hand_over=False))
+    assert other.data is screen.data
+    np.testing.assert_array_equal(hrt.march(rays, other).prim_id, hrt.march(rays, screen).prim_id)
+    for technique in (hrt.Certified(), hrt.Certified(cell=2, guard=2.0), hrt.Paper()):
+        with pytest.raises(hrt.ArgumentError, match="technique: expected one that reads what"):
+            screen.of(technique)
+        with pytest.raises(hrt.ArgumentError, match="technique: expected one that reads what"):
+            technique.march(rays, screen)
 
 
 def test_long_lists_answer_what_short_ones_cannot():
@@ -141,10 +144,10 @@ def scene_of(*corners):
 CAMERA = hrt.Camera.look_at((0, 0, 0), (0, 0, -1), vfov_deg=90, width=16, height=16, near=0.1)
 
 
-def march_one(scene, origin, direction, camera=CAMERA, lists=2, mode="certified", **limits):
+def march_one(scene, origin, direction, camera=CAMERA, lists=2, **limits):
     limits = {name: [value] for name, value in limits.items()}
     rays = hrt.Rays.from_arrays([origin], np.array([direction], float), None, **limits)
-    return certified(scene, camera, rays, lists, mode)
+    return certified(scene, camera, rays, lists)
 
 
 def test_statuses():
@@ -236,31 +239,19 @@ def test_budgets():
     scene = random_scene(rng, 200, spread=1.5)
     camera = hrt.Camera.look_at((0, 0, 6), (0, 0, 0), width=64, height=48)
     rays = hrt.mirror_rays(hrt.rasterize(scene, camera))
-    free = certified(scene, camera, rays, 8, hrt.Certified(64, None))
+    free = certified(scene, camera, rays, 8, max_tests=64, max_steps=None)
     assert (free.status != S.EXHAUSTED).all()
-    for mode in (hrt.Certified(max_tests=1), hrt.Certified(max_steps=5)):
-        tight = certified(scene, camera, rays, 8, mode)
+    for budget in ({"max_tests": 1}, {"max_steps": 5}):
+        tight = certified(scene, camera, rays, 8, **budget)
         assert (tight.status == S.EXHAUSTED).any()
         assert (tight.prim_id[tight.resolved] == free.prim_id[tight.resolved]).all()
         assert_true(
             scene,
             rays.take(np.arange(100)),
-            certified(scene, camera, rays.take(np.arange(100)), 8, mode),
+            certified(scene, camera, rays.take(np.arange(100)), 8, **budget),
         )
     assert free.tests > 0
-    assert certified(scene, camera, rays, 8, hrt.Certified(max_tests=1)).tests <= len(rays)
-
-
-def test_what_is_missing_is_made():
-    rng = np.random.default_rng(9)
-    scene = random_scene(rng, 60)
-    camera = hrt.Camera.look_at((0, 0, 6), (0, 0, 0), width=32, height=24)
-    plain = hrt.rasterize(scene, camera)
-    rays = hrt.mirror_rays(plain)
-    made = hrt.march(rays, plain, hrt.build_depth_pyramid(plain), "certified")
-    given = certified(scene, camera, rays, 8)
-    for name in ("status", "prim_id", "t", "t_free", "steps"):
-        assert np.array_equal(getattr(made, name), getattr(given, name)), name
+    assert certified(scene, camera, rays, 8, max_tests=1).tests <= len(rays)
 
 
 def test_depth_at_the_centres_is_never_read():
@@ -268,30 +259,30 @@ def test_depth_at_the_centres_is_never_read():
     rng = np.random.default_rng(10)
     scene = random_scene(rng, 60)
     camera = hrt.Camera.look_at((0, 0, 6), (0, 0, 0), width=32, height=24)
-    gbuffer, pyramid = prepare(scene, camera)
+    gbuffer = hrt.rasterize(scene, camera)
     rays = hrt.mirror_rays(gbuffer)
-    before = hrt.march(rays, gbuffer, pyramid, "certified")
-    gbuffer.depth[:] = 0.123
-    gbuffer.prim_id[:] = 0
-    after = hrt.march(rays, gbuffer, pyramid, "certified")
+    before = through(rays, gbuffer, "certified")
+    wrong = dataclasses.replace(
+        gbuffer,
+        depth=np.full_like(gbuffer.depth, 0.123),
+        prim_id=np.zeros_like(gbuffer.prim_id),
+    )
+    after = through(rays, wrong, "certified")
     assert np.array_equal(before.prim_id, after.prim_id)
-
-
-def test_a_conservative_pyramid_is_not_the_papers():
-    scene = scene_of(wall())
-    gbuffer, pyramid = prepare(scene, CAMERA)
-    rays = hrt.mirror_rays(gbuffer)
-    with pytest.raises(
-        hrt.ArgumentError, match="pyramid: expected one of the depths at pixel cent"
-    ):
-        hrt.march(rays, gbuffer, pyramid, "paper")
-    with pytest.raises(hrt.ArgumentError, match="gbuffer: expected one with lists"):
-        hrt.build_depth_pyramid(hrt.rasterize(scene, CAMERA), conservative=True)
 
 
 @pytest.mark.parametrize(
     ("parameters", "argument"),
     [
+        ({"lists": 0}, "lists"),
+        ({"lists": 65}, "lists"),
+        ({"lists": 2.5}, "lists"),
+        ({"lists": "8"}, "lists"),
+        ({"cell": 0}, "cell"),
+        ({"cell": 65}, "cell"),
+        ({"guard": 0.9}, "guard: expected a number from 1 to 8"),
+        ({"guard": np.nan}, "guard"),
+        ({"planes": 1}, "planes"),
         ({"max_tests": 0}, "max_tests"),
         ({"max_steps": 0}, "max_steps"),
         ({"hand_over": 1}, "hand_o"),
@@ -313,10 +304,10 @@ def test_threads_change_nothing():
     rng = np.random.default_rng(12)
     scene = random_scene(rng, 100)
     camera = hrt.Camera.look_at((0, 0, 6), (0, 0, 0), width=64, height=48)
-    gbuffer, pyramid = prepare(scene, camera)
+    gbuffer = hrt.rasterize(scene, camera)
     rays = hrt.mirror_rays(gbuffer)
-    one = hrt.march(rays, gbuffer, pyramid, "certified", threads=1)
-    all_ = hrt.march(rays, gbuffer, pyramid, "certified", threads=_threads.available())
+    one = through(rays, gbuffer, "certified", threads=1)
+    all_ = through(rays, gbuffer, "certified", threads=_threads.available())
     for name in (
         "status",
         "resolved",

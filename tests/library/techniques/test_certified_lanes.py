@@ -4,7 +4,6 @@ What these answers are worth is tested in test_certified.py, for both.
 """
 
 import dataclasses
-import inspect
 import os
 import subprocess
 import sys
@@ -13,12 +12,11 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt.kernels.techniques.certified import look as looks
 from hybrid_rt.kernels.techniques.certified import slots
-from hybrid_rt.kernels.techniques.certified.step import step as step_kernel
 from hybrid_rt_scenes.hard_cases import get_hard_case, hard_case_names
 from support.machines import MACHINES, machine
-from support.soup import other_views, prepare, random_rays, random_scene
+from support.screens import through
+from support.soup import FORMS, random_rays, random_scene
 
 S = hrt.MarchStatus
 FIELDS = ("status", "resolved", "pixel", "prim_id", "t", "t_free", "steps")
@@ -48,10 +46,13 @@ def assert_work_is_that_of(marched):
     assert np.isnan(work.busy["step"]) == (work.steps == 0)
 
 
-def assert_vectors_change_nothing(rays, gbuffer, pyramid, any_hit=False, **parameters):
+def assert_vectors_change_nothing(rays, gbuffer, technique, any_hit=False, **parameters):
+    screen = hrt.prepare(gbuffer, technique)
     lanes, single = (
         hrt.march(
-            rays, gbuffer, pyramid, hrt.Certified(vectors=vectors, **parameters), any_hit=any_hit
+            rays,
+            screen.of(dataclasses.replace(technique, vectors=vectors, **parameters)),
+            any_hit=any_hit,
         )
         for vectors in (True, False)
     )
@@ -69,8 +70,9 @@ def test_lists_of_another_view(seed):
     rng = np.random.default_rng(700 + seed)
     scene = random_scene(rng, 80)
     camera = hrt.Camera.look_at((0, 0, 6), (0, 0, 0), width=40, height=24)
-    gbuffer, pyramid = prepare(scene, camera, 8, other_views(camera)[seed])
-    assert_vectors_change_nothing(odd_rays(rng, scene, camera, 400), gbuffer, pyramid)
+    rays = odd_rays(rng, scene, camera, 400)
+    gbuffer = hrt.rasterize(scene, camera)
+    assert_vectors_change_nothing(rays, gbuffer, hrt.Certified(**FORMS[seed]))
 
 
 def odd_rays(rng, scene, camera, n):
@@ -88,7 +90,7 @@ def odd_rays(rng, scene, camera, n):
 
 
 def random_case(seed, n=2000, *, length=None):
-    """Return (rays, gbuffer, pyramid) of a random scene and camera."""
+    """Return (rays, gbuffer, technique) of a random scene and camera."""
     rng = np.random.default_rng(seed)
     width, height = SIZES[seed % len(SIZES)]
     scene = random_scene(rng, 24 + 8 * (seed % 5))
@@ -96,8 +98,8 @@ def random_case(seed, n=2000, *, length=None):
         (0.1, 0.2, 5), (0.2, 0, -1), vfov_deg=(70, 20, 120)[seed % 3], width=width, height=height,
         near=(0.1, 1.5)[seed % 2],
     )  # fmt: skip
-    gbuffer, pyramid = prepare(scene, camera, length or (1, 2, 4, 16)[seed % 4])
-    return odd_rays(rng, scene, camera, n), gbuffer, pyramid
+    technique = hrt.Certified(lists=length or (1, 2, 4, 16)[seed % 4])
+    return odd_rays(rng, scene, camera, n), hrt.rasterize(scene, camera), technique
 
 
 @pytest.mark.parametrize("seed", range(28))
@@ -128,16 +130,15 @@ def test_budgets(seed, budget):
 @pytest.mark.parametrize("name", hard_case_names())
 def test_the_hard_set(name):
     case = get_hard_case(name).build()
-    pyramid = hrt.build_depth_pyramid(case.gbuffer)
     for any_hit in (False, True):
-        assert_vectors_change_nothing(case.rays, case.gbuffer, pyramid, any_hit)
+        assert_vectors_change_nothing(case.rays, case.gbuffer, hrt.Certified(), any_hit)
 
 
 @pytest.mark.parametrize("probes", [2, 16])
 def test_threads_change_nothing(probes):
-    rays, gbuffer, pyramid = random_case(6, 20000)
-    mode = hrt.Certified(probes=probes)
-    one, two = (hrt.march(rays, gbuffer, pyramid, mode, threads=threads) for threads in (1, 2))
+    rays, gbuffer, technique = random_case(6, 20000)
+    technique = dataclasses.replace(technique, probes=probes)
+    one, two = (through(rays, gbuffer, technique, threads=threads) for threads in (1, 2))
     assert_same(one, two)
     assert one.tests == two.tests
     done, again = (dataclasses.asdict(marched.work) for marched in (one, two))
@@ -146,38 +147,20 @@ def test_threads_change_nothing(probes):
     assert done["tests"] > 0
 
 
-def test_what_a_lane_gathers_is_what_is_written_down():
-    step, look, test, corner = (
-        inspect.getsource(stage.py_func)
-        for stage in (step_kernel, looks.look, looks.test, looks.corner)
-    )
-    corners = inspect.getsource(looks.test_primitives.py_func).count(" corner(")
-    assert step.count("gather(cells") == slots.CELLS_A_STEP
-    assert step.count("gather(slots_") == slots.ROWS_A_REFILL
-    of_entry = look.count("gather(prim_id") + look.count("gather(nearest")
-    assert of_entry == slots.NUMBERS_AN_ENTRY
-    assert look.count("gather(rest") == slots.NUMBERS_A_REST
-    assert look.count("gather(planes") == slots.NUMBERS_A_PLANE
-    assert look.count(" at(slots_") == slots.ROWS_A_LOOK + 1
-    of_hit = test[test.index("if simd.any_(hit)") :].count("at(slots_")
-    assert test.count("at(slots_") - of_hit == slots.ROWS_A_TEST - 1
-    assert corners * corner.count("gather(corners") == slots.NUMBERS_A_TEST
-    written = sum(stage.count("gather(") for stage in (step, look))
-    assert written == 1 + 14 + 2 + 1 + 6  # whatever else is gathered is to be added to them
-
-
 PROGRAM = """
 import sys
 import numpy as np
 import hybrid_rt as hrt
 from hybrid_rt.kernels.simd import WIDTH
-from unit.test_certified_simd import FIELDS, random_case
+from library.techniques.test_certified_lanes import FIELDS, random_case
+from support.screens import through
 
-marched = hrt.march(*random_case(6), hrt.Certified())
+marched = through(*random_case(6))
 np.savez(sys.argv[1], width=WIDTH, **{name: getattr(marched, name) for name in FIELDS})
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MACHINES)
 def test_the_same_on_another_machine(name, tmp_path):
     env, width = machine(name)
@@ -191,19 +174,21 @@ def test_the_same_on_another_machine(name, tmp_path):
     with np.load(path) as other:
         assert other["width"] == width
         theirs = hrt.Marched(**{field: other[field] for field in FIELDS})
-    assert_same(hrt.march(*random_case(6), hrt.Certified()), theirs)
+    assert_same(through(*random_case(6)), theirs)
 
 
 @pytest.mark.parametrize("n", [2000, 2001, 1024 + 16 + 3])
 @pytest.mark.parametrize("probes", [1, 2, 4, 8])
 def test_probes_decide_what_is_marched_and_change_no_answer(probes, n):
-    rays, gbuffer, pyramid = random_case(6, n)
+    rays, gbuffer, technique = random_case(6, n)
     # Neighbours alike, as rays of neighbouring pixels are: half of the groups look away.
     away = np.arange(n) // 16 % 2 == 0
-    rays.origin[away] = gbuffer.camera.eye
-    rays.direction[away] = -np.array(gbuffer.camera.forward)
-    everything = hrt.march(rays, gbuffer, pyramid, hrt.Certified())
-    marched = hrt.march(rays, gbuffer, pyramid, hrt.Certified(probes=probes))
+    origin, direction = rays.origin.copy(), rays.direction.copy()
+    origin[away] = gbuffer.camera.eye
+    direction[away] = -np.array(gbuffer.camera.forward)
+    rays = dataclasses.replace(rays, origin=origin, direction=direction)
+    everything = through(rays, gbuffer, technique)
+    marched = through(rays, gbuffer, dataclasses.replace(technique, probes=probes))
     skipped = marched.status == S.SKIPPED
     assert 0.2 < skipped.mean() < 0.9
     assert_same(marched, everything, ~skipped)
@@ -224,26 +209,21 @@ def test_probes_decide_what_is_marched_and_change_no_answer(probes, n):
 
 
 def test_arrays_that_cannot_be_written_or_have_gaps():
-    rays, gbuffer, pyramid = random_case(0)
+    rays, gbuffer, technique = random_case(0)
     wide = np.zeros((len(rays), 2), np.float32)
     wide[:, 0] = rays.t_near
+    assert not rays.direction.flags.writeable
     others = hrt.Rays(
-        np.asfortranarray(rays.origin), rays.direction.copy(), rays.pixel, wide[:, 0],
-        rays.t_far.copy(),
-    )  # fmt: skip
-    others.direction.flags.writeable = False
-    others.t_far.flags.writeable = False
-    assert_vectors_change_nothing(others, gbuffer, pyramid)
-    assert_same(
-        hrt.march(rays, gbuffer, pyramid, "certified"),
-        hrt.march(others, gbuffer, pyramid, "certified"),
+        np.asfortranarray(rays.origin), rays.direction, rays.pixel, wide[:, 0], rays.t_far
     )
+    assert_vectors_change_nothing(others, gbuffer, technique)
+    assert_same(through(rays, gbuffer, technique), through(others, gbuffer, technique))
 
 
 def test_arrays_too_long_for_the_lanes_are_marched_ray_by_ray(monkeypatch):
     case = random_case(0)
-    expected = hrt.march(*case, hrt.Certified())
+    expected = through(*case)
     monkeypatch.setattr("hybrid_rt.techniques.certified.LARGEST_INDEX", 100)
-    marched = hrt.march(*case, hrt.Certified())
+    marched = through(*case)
     assert_same(marched, expected)
     assert marched.steps_by_level is not None

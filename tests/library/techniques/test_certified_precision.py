@@ -7,6 +7,7 @@ import pytest
 
 import hybrid_rt as hrt
 from hybrid_rt.kernels.techniques.certified import scalar as kernels
+from support.screens import lists_of, through
 
 S = hrt.MarchStatus
 
@@ -46,10 +47,9 @@ def test_a_ray_that_float32_puts_into_the_next_row_meets_the_wires_of_its_own():
     assert len(origins) > 50
     points = np.array(corners, np.float32)
     scene = hrt.Scene.from_arrays(points, np.arange(len(points)).reshape(-1, 3))
-    gbuffer = hrt.rasterize(scene, camera, lists=2)
-    pyramid = hrt.build_depth_pyramid(gbuffer, conservative=True)
+    gbuffer = hrt.rasterize(scene, camera)
     rays = hrt.Rays.from_arrays(origins, np.tile((1.0, 0, 0), (len(origins), 1)))
-    marched = hrt.march(rays, gbuffer, pyramid, "certified")
+    marched = through(rays, gbuffer, hrt.Certified(lists=2))
     assert (marched.status == S.HIT).all()
     assert (marched.prim_id == 1 + np.arange(len(rays))).all()
 
@@ -80,7 +80,7 @@ def test_bounds_are_rounded_up():
     for k in range(200):
         z = F(1.0 + k * 0.037)
         points = np.array([(-99, -99, -z), (99, -99, -z), (0, 99, -z)], np.float32)
-        lists = hrt.rasterize(hrt.Scene.from_arrays(points, [[0, 1, 2]]), camera, lists=1).lists
+        lists = lists_of(hrt.Scene.from_arrays(points, [[0, 1, 2]]), camera, 1)
         true = Fraction(0.1) / Fraction(float(z))
         assert Fraction(float(lists.nearest[2, 2, 0])) >= true
         down += F(float(true)) < true
@@ -97,9 +97,8 @@ def test_a_ray_and_the_plane_that_it_starts_on():
              for j in range(10) for i in range(12)]  # fmt: skip
     faces = [t for a, b, c, d in quads for t in ((a, b, c), (b, d, c))]
     scene = hrt.Scene.from_arrays(points, faces)
-    gbuffer = hrt.rasterize(scene, camera, lists=4)
-    pyramid = hrt.build_depth_pyramid(gbuffer, conservative=True)
+    gbuffer = hrt.rasterize(scene, camera)
     rays = hrt.mirror_rays(gbuffer)
-    marched = hrt.march(rays, gbuffer, pyramid, "certified")
+    marched = through(rays, gbuffer, hrt.Certified(lists=4))
     assert not (marched.status == S.HIT).any()
     assert (marched.status == S.MISS).mean() > 0.8

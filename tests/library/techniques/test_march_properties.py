@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 import hybrid_rt as hrt
 from hybrid_rt import _threads
 from support import synthetic
+from support.screens import through
 
 FIELDS = ("status", "resolved", "pixel", "prim_id", "t", "t_free", "steps")
 seeds = st.integers(0, 2**32 - 1)
@@ -16,16 +17,16 @@ def case(seed, n=200):
     rng = np.random.default_rng(seed)
     width, height = (int(x) for x in rng.integers(1, 70, 2))
     buffer = synthetic.random_gbuffer(rng, width, height)
-    return rng, buffer, hrt.build_depth_pyramid(buffer), synthetic.random_rays(rng, buffer, n)
+    return rng, buffer, synthetic.random_rays(rng, buffer, n)
 
 
 @settings(max_examples=30, deadline=None)
 @given(seeds)
 def test_permuting_rays_permutes_results(seed):
-    rng, buffer, pyramid, rays = case(seed)
+    rng, buffer, rays = case(seed)
     order = rng.permutation(len(rays))
-    straight = hrt.march(rays, buffer, pyramid)
-    permuted = hrt.march(rays.take(order), buffer, pyramid)
+    straight = through(rays, buffer)
+    permuted = through(rays.take(order), buffer)
     for name in FIELDS:
         np.testing.assert_array_equal(getattr(straight, name)[order], getattr(permuted, name))
 
@@ -33,9 +34,9 @@ def test_permuting_rays_permutes_results(seed):
 @settings(max_examples=15, deadline=None)
 @given(seeds, st.integers(1, 8))
 def test_the_number_of_threads_changes_nothing(seed, samples):
-    _, buffer, pyramid, rays = case(seed, n=3000)
-    one = hrt.march(rays, buffer, pyramid, hrt.Paper(samples), threads=1)
-    all_ = hrt.march(rays, buffer, pyramid, hrt.Paper(samples), threads=_threads.available())
+    _, buffer, rays = case(seed, n=3000)
+    one = through(rays, buffer, hrt.Paper(samples), threads=1)
+    all_ = through(rays, buffer, hrt.Paper(samples), threads=_threads.available())
     for name in (*FIELDS, "steps_by_level"):
         np.testing.assert_array_equal(getattr(one, name), getattr(all_, name))
 
@@ -43,8 +44,8 @@ def test_the_number_of_threads_changes_nothing(seed, samples):
 @settings(max_examples=30, deadline=None)
 @given(seeds)
 def test_answers_hold_together(seed):
-    _, buffer, pyramid, rays = case(seed)
-    marched = hrt.march(rays, buffer, pyramid)
+    _, buffer, rays = case(seed)
+    marched = through(rays, buffer)
     hit = marched.status == hrt.MarchStatus.HIT
     x, y = marched.pixel[hit].T
     np.testing.assert_array_equal(marched.prim_id[hit], buffer.prim_id[y, x])

@@ -5,6 +5,7 @@ import pytest
 
 import hybrid_rt as hrt
 from support import synthetic
+from support.screens import through
 
 S = hrt.MarchStatus
 NEAR = 0.1
@@ -33,7 +34,7 @@ def across(buffer, z_start, z_end, mode, x_from=0.5, x_to=64.5, **limits):
     start, end = hrt.unproject(buffer.camera, ends)
     limits = {name: [value] for name, value in limits.items()}
     rays = hrt.Rays.from_arrays([start], [end - start], **limits)
-    return hrt.march(rays, buffer, hrt.build_depth_pyramid(buffer), mode)
+    return through(rays, buffer, mode)
 
 
 @pytest.mark.parametrize(
@@ -132,9 +133,8 @@ def test_hiz_does_not_trust_what_lies_at_the_border():
     start = hrt.unproject(buffer.camera, [[20.5, 20.5, NEAR / 2], [2.5, 20.5, NEAR / 2]])
     end = hrt.unproject(buffer.camera, [[22.5, 20.5, NEAR / 6], [1.5, 20.5, NEAR / 6]])
     rays = hrt.Rays.from_arrays(start, end - start)
-    pyramid = hrt.build_depth_pyramid(buffer)
     for border, hits in ((0.0, [True, True]), (0.1, [True, False]), (1.0, [False, False])):
-        marched = hrt.march(rays, buffer, pyramid, hrt.HiZ(1.0, border=border))
+        marched = through(rays, buffer, hrt.HiZ(1.0, border=border))
         assert marched.resolved.tolist() == hits
 
 
@@ -149,7 +149,7 @@ def test_hiz_does_not_hit_a_surface_that_faces_away():
         start = ends[0] if hit else ends[1]
         rays = hrt.Rays.from_arrays([start], [direction])
         mode = hrt.HiZ(100.0, threshold=0.5, border=0.0)
-        marched = hrt.march(rays, buffer, hrt.build_depth_pyramid(buffer), mode)
+        marched = through(rays, buffer, mode)
         assert bool(marched.resolved[0]) is hit
 
 
@@ -205,11 +205,7 @@ def test_slope_frees_rays_that_leave_a_floor():
     start = np.concatenate([pixel + 0.5, buffer.depth.reshape(-1, 1)], axis=1)
     origin = hrt.unproject(buffer.camera, start)
     rays = hrt.Rays.from_arrays(origin, np.tile([0.0, 0.75, -1.0], (len(origin), 1)), pixel)
-    pyramid = hrt.build_depth_pyramid(buffer)
-    hidden = [
-        (hrt.march(rays, buffer, pyramid, mode).status == S.HIDDEN).sum()
-        for mode in ("paper", "slope")
-    ]
+    hidden = [(through(rays, buffer, mode).status == S.HIDDEN).sum() for mode in ("paper", "slope")]
     assert hidden[0] > 100
     assert hidden[1] == 0
 
@@ -218,27 +214,12 @@ def test_slope_answers_with_the_tilted_plane():
     buffer = tilted_floor()
     ends = np.array([[16.5, 5.5, 0.05], [16.5, 30.5, 0.03]])
     start, end = hrt.unproject(buffer.camera, ends)
-    marched = hrt.march(
-        hrt.Rays.from_arrays([start], [end - start]),
-        buffer,
-        hrt.build_slope_pyramid(buffer),
-        "slope",
-    )
+    marched = through(hrt.Rays.from_arrays([start], [end - start]), buffer, "slope")
     assert S(int(marched.status[0])) is S.HIT
     at = hrt.project(buffer.camera, start + marched.t * (end - start)[None])[0]
     # 0.05 - 0.0008 (y - 5.5) = 0.01 + 0.002 y
     np.testing.assert_allclose(at[1], (0.05 + 0.0008 * 5.5 - 0.01) / 0.0028, rtol=1e-5)
     assert tuple(marched.pixel[0]) == (16, int(at[1]))
-
-
-def test_slope_takes_either_pyramid():
-    rng = np.random.default_rng(5)
-    buffer = synthetic.random_gbuffer(rng, 33, 21)
-    rays = synthetic.random_rays(rng, buffer, 300)
-    one = hrt.march(rays, buffer, hrt.build_depth_pyramid(buffer), "slope")
-    two = hrt.march(rays, buffer, hrt.build_slope_pyramid(buffer), "slope")
-    for name in ("status", "pixel", "t", "t_free", "steps", "steps_by_level"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
 
 
 def test_slope_reads_fewer_cells_with_coarser_ones():
@@ -265,7 +246,7 @@ def test_rays_that_cannot_start(mode):
     origin = [(0, 0, -2), (np.nan, 0, 0), (0, 0, 1), (9, 0, -2)]
     direction = [(0, 0, 0), (0, 0, 1), (0, 0, -1), (0, 0, -1)]
     rays = hrt.Rays.from_arrays(origin, direction)
-    marched = hrt.march(rays, buffer, hrt.build_depth_pyramid(buffer), mode)
+    marched = through(rays, buffer, mode)
     assert marched.status.tolist() == [S.INVALID, S.INVALID, S.NEAR, S.OFFSCREEN]
     assert not marched.resolved.any()
     assert (marched.t_free == 0).all()
@@ -276,7 +257,7 @@ def test_rays_that_cannot_start(mode):
 def test_nothing_to_march(mode):
     buffer = wall_in_a_row(2.0)
     rays = hrt.Rays.from_arrays(np.empty((0, 3)), np.empty((0, 3)))
-    assert len(hrt.march(rays, buffer, hrt.build_depth_pyramid(buffer), mode)) == 0
+    assert len(through(rays, buffer, mode)) == 0
 
 
 @pytest.mark.parametrize(
@@ -307,18 +288,3 @@ def test_nothing_to_march(mode):
 def test_bad_parameters(mode, parameters, argument):
     with pytest.raises(hrt.ArgumentError, match=f"^{argument}: expected"):
         mode(**parameters)
-
-
-@pytest.mark.parametrize("mode", ["paper", "linear", "dda", "hiz"])
-def test_a_slope_pyramid_is_for_mode_slope(mode):
-    buffer = wall_in_a_row(2.0)
-    rays = hrt.Rays.from_arrays(np.zeros((1, 3)), np.ones((1, 3)))
-    with pytest.raises(hrt.ArgumentError, match="pyramid: expected a DepthPyramid"):
-        hrt.march(rays, buffer, hrt.build_slope_pyramid(buffer), mode)
-
-
-def test_the_slope_pyramid_of_another_view_is_refused():
-    rays = hrt.Rays.from_arrays(np.zeros((1, 3)), np.ones((1, 3)))
-    other = hrt.build_slope_pyramid(tilted_floor())
-    with pytest.raises(hrt.ArgumentError, match="65 by 1 pixels at level 0, got one of 32 by 48"):
-        hrt.march(rays, wall_in_a_row(2.0), other, "slope")

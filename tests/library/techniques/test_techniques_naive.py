@@ -7,6 +7,7 @@ import hybrid_rt as hrt
 from naive import slabs, strict
 from naive.walk import View
 from support import synthetic
+from support.screens import through
 
 # The kernels compute in float32 with coordinates of tens of pixels: decisions that hang on less
 # than this relative distance may go either way.
@@ -87,7 +88,7 @@ def compare(oracle, mode, names, buffer, rays):
     view = View(
         buffer.depth, buffer.ddx, buffer.ddy, camera.pixel_from_world, camera.eye, camera.near
     )
-    marched = hrt.march(rays, buffer, hrt.build_depth_pyramid(buffer), mode)
+    marched = through(rays, buffer, mode)
     parameters = {name: getattr(mode, name) for name in names}
     compared = hits = 0
     for i in range(len(rays)):

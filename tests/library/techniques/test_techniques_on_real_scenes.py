@@ -5,6 +5,7 @@ import pytest
 
 import hybrid_rt as hrt
 from hybrid_rt_scenes import get_scene
+from support.screens import through
 
 # The bounds are wide: they tell a technique that works from one that does not. Share of rays
 # answered with a hit, and the largest share of those that may lie more than a pixel off.
@@ -29,11 +30,10 @@ def counted():
     truth = hrt.EmbreeTracer(scene).intersect(rays)
     at = rays.origin + np.where(np.isfinite(truth.t), truth.t, 0)[:, None] * rays.direction
     true_pixel = hrt.project(buffer.camera, at)[:, :2] - 0.5
-    pyramid = hrt.build_depth_pyramid(buffer)
     counts = {}
     print()
     for name in BOUNDS:
-        marched = hrt.march(rays, buffer, pyramid, name)
+        marched = through(rays, buffer, name)
         hit = marched.prim_id >= 0
         near = np.abs(true_pixel - marched.pixel).max(axis=1) <= 1
         wrong = hit & ((truth.prim_id < 0) | ~near)

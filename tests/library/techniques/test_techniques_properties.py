@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 import hybrid_rt as hrt
 from hybrid_rt import _threads
 from support import synthetic
+from support.screens import through
 
 FIELDS = ("status", "resolved", "pixel", "prim_id", "t", "t_free", "steps")
 S = hrt.MarchStatus
@@ -47,16 +48,16 @@ def case(seed, n=200):
     rng = np.random.default_rng(seed)
     width, height = (int(x) for x in rng.integers(1, 70, 2))
     buffer = synthetic.random_gbuffer(rng, width, height)
-    return rng, buffer, hrt.build_depth_pyramid(buffer), synthetic.random_rays(rng, buffer, n)
+    return rng, buffer, synthetic.random_rays(rng, buffer, n)
 
 
 @settings(max_examples=40, deadline=None)
 @given(seeds, modes)
 def test_permuting_rays_permutes_results(seed, mode):
-    rng, buffer, pyramid, rays = case(seed)
+    rng, buffer, rays = case(seed)
     order = rng.permutation(len(rays))
-    straight = hrt.march(rays, buffer, pyramid, mode)
-    permuted = hrt.march(rays.take(order), buffer, pyramid, mode)
+    straight = through(rays, buffer, mode)
+    permuted = through(rays.take(order), buffer, mode)
     for name in FIELDS:
         np.testing.assert_array_equal(getattr(straight, name)[order], getattr(permuted, name))
 
@@ -64,9 +65,9 @@ def test_permuting_rays_permutes_results(seed, mode):
 @settings(max_examples=25, deadline=None)
 @given(seeds, modes)
 def test_the_number_of_threads_changes_nothing(seed, mode):
-    _, buffer, pyramid, rays = case(seed, n=3000)
-    one = hrt.march(rays, buffer, pyramid, mode, threads=1)
-    all_ = hrt.march(rays, buffer, pyramid, mode, threads=_threads.available())
+    _, buffer, rays = case(seed, n=3000)
+    one = through(rays, buffer, mode, threads=1)
+    all_ = through(rays, buffer, mode, threads=_threads.available())
     for name in (*FIELDS, "steps_by_level"):
         np.testing.assert_array_equal(getattr(one, name), getattr(all_, name))
 
@@ -74,8 +75,8 @@ def test_the_number_of_threads_changes_nothing(seed, mode):
 @settings(max_examples=80, deadline=None)
 @given(seeds, modes)
 def test_answers_hold_together(seed, mode):
-    _, buffer, pyramid, rays = case(seed)
-    marched = hrt.march(rays, buffer, pyramid, mode)
+    _, buffer, rays = case(seed)
+    marched = through(rays, buffer, mode)
     hit = marched.prim_id >= 0
     miss = marched.resolved & ~hit
     x, y = marched.pixel[hit].T
@@ -112,14 +113,14 @@ def test_answers_hold_together(seed, mode):
 @settings(max_examples=25, deadline=None)
 @given(seeds)
 def test_switches_of_hiz_touch_only_their_own_rays(seed):
-    _, buffer, pyramid, rays = case(seed)
+    _, buffer, rays = case(seed)
     settings_ = {"thickness": 0.5, "max_steps": 6}
     strict = hrt.HiZ(exhausted_hits=False, trace_background=True, **settings_)
-    base = hrt.march(rays, buffer, pyramid, strict)
+    base = through(rays, buffer, strict)
     for exhausted in (False, True):
         for traced in (False, True):
             mode = hrt.HiZ(exhausted_hits=exhausted, trace_background=traced, **settings_)
-            other = hrt.march(rays, buffer, pyramid, mode)
+            other = through(rays, buffer, mode)
             np.testing.assert_array_equal(base.status, other.status)
             new = other.resolved & ~base.resolved
             assert other.resolved[base.resolved].all()
@@ -130,10 +131,8 @@ def test_switches_of_hiz_touch_only_their_own_rays(seed):
 @settings(max_examples=25, deadline=None)
 @given(seeds)
 def test_a_thicker_slab_never_loses_a_dda_hit(seed):
-    _, buffer, pyramid, rays = case(seed)
-    hits = [
-        hrt.march(rays, buffer, pyramid, hrt.PixelDDA(t)).resolved for t in (0.01, 0.1, 1.0, 10.0)
-    ]
+    _, buffer, rays = case(seed)
+    hits = [through(rays, buffer, hrt.PixelDDA(t)).resolved for t in (0.01, 0.1, 1.0, 10.0)]
     for thin, thick in itertools.pairwise(hits):
         assert thick[thin].all()
 

@@ -12,7 +12,7 @@ import hybrid_rt as hrt
 from hybrid_rt.trace import native as embree
 
 needs_packets = pytest.mark.skipif(
-    hrt.packet_available() is not None, reason=str(hrt.packet_available())
+    hrt.embree_problem() is not None, reason=str(hrt.embree_problem())
 )
 
 
@@ -82,11 +82,11 @@ def test_library_is_found_where_wheels_keep_it(installed, place):
     file.parent.mkdir(exist_ok=True)
     file.write_bytes(b"not a library")
     assert embree._library_path() == file
-    assert "cannot be used" in hrt.packet_available()
+    assert "cannot be used" in hrt.embree_problem()
 
 
 def test_without_the_library_packets_say_so_and_run_serves(installed, scene):
-    reason = hrt.packet_available()
+    reason = hrt.embree_problem()
     assert 'path="run" serves instead' in reason
     with pytest.raises(hrt.EmbreeError, match='path="run" serves instead'):
         hrt.EmbreeTracer(scene)
@@ -99,7 +99,7 @@ def test_without_the_library_packets_say_so_and_run_serves(installed, scene):
 
 def test_without_embreex_the_reason_is_that(monkeypatch, installed):
     monkeypatch.setattr(embree.importlib.util, "find_spec", lambda name: None)
-    assert hrt.packet_available() == "embreex is not installed"
+    assert hrt.embree_problem() == "embreex is not installed"
 
 
 @needs_packets
@@ -113,7 +113,7 @@ def test_errors_of_embree_are_raised_with_its_words(scene):
 
 SCRIPT = """
 import numpy as np, hybrid_rt as hrt
-from hybrid_rt.kernels import embree as kernels
+from hybrid_rt.kernels.trace import embree as kernels
 vertices = np.array([(-1, -1, -2), (1, -1, -2), (0, 1, -2)], np.float32)
 scene = hrt.Scene.from_arrays(vertices, np.array([[0, 1, 2]], np.int32))
 rays = hrt.Rays.from_arrays(np.zeros((20, 3)), np.tile([(0.0, 0, -1)], (20, 1)))
@@ -124,6 +124,7 @@ print(len(kernels.intersect.signatures), sum(kernels.intersect.stats.cache_hits.
 """
 
 
+@pytest.mark.slow
 @needs_packets
 def test_machine_code_is_compiled_once_and_serves_the_next_process(tmp_path):
     """Function addresses are arguments; as globals they would be of the first process."""

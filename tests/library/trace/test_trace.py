@@ -26,7 +26,7 @@ WAYS = {
     },
     "run": {"path": "run"},
 }
-REASON = hrt.packet_available()
+REASON = hrt.embree_problem()
 needs_packets = pytest.mark.skipif(REASON is not None, reason=str(REASON))
 FIELDS = ("t", "prim_id", "u", "v", "n_g")
 

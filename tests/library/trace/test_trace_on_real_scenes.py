@@ -10,7 +10,7 @@ from support import DATA
 SPONZA = DATA / "sponza.npz"
 pytestmark = pytest.mark.skipif(not SPONZA.is_file(), reason="sponza.npz is not there")
 CAMERA = hrt.Camera.look_at((-10, 1.5, 0), (5, 3, 0), width=320, height=180)
-REASON = hrt.packet_available()
+REASON = hrt.embree_problem()
 WAYS = [{"path": "run"}]
 if REASON is None:
     WAYS += [{"path": "packet", "width": w, "coherent": c} for w in (1, 4, 8, 16) for c in (0, 1)]

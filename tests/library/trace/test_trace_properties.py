@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 import hybrid_rt as hrt
 from naive import triangle as naive
 
-PATH = "packet" if hrt.packet_available() is None else "run"
+PATH = "packet" if hrt.embree_problem() is None else "run"
 lattice = st.integers(-3, 3)
 points = st.tuples(lattice, lattice, lattice)
 # A main axis of a power of two keeps every quotient exact, so that edges are met exactly.

@@ -32,7 +32,7 @@ def outcome(target: Any, parameter: str, label: str) -> str:
     valid = examples.arguments(target.label, function)
     try:
         value = junk.value(label, valid[parameter])
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, RuntimeWarning):
         return "not for this argument"
     try:
         used = "use"

@@ -31,8 +31,9 @@ def _bound(name: str, method: str) -> Callable[[], Any]:
 
 def _methods(name: str, cls: type) -> Iterator[Target]:
     for method, static in inspect.getmembers_static(cls):
-        public = not method.startswith("_") or method in ("__getitem__", "__contains__")
-        if not public or inspect.isclass(static):
+        inner = getattr(static, "__func__", static)
+        ours = str(getattr(inner, "__module__", "")).startswith("hybrid_rt")
+        if not ours or (method.startswith("_") and method != "__getitem__"):
             continue
         if isinstance(static, (classmethod, staticmethod)):
             yield Target(f"{name}.{method}", lambda m=method: getattr(cls, m))

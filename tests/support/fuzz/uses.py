@@ -23,12 +23,12 @@ def _camera(camera: hrt.Camera) -> None:
 
 def _gbuffer(buffer: hrt.GBuffer) -> None:
     rays = hrt.mirror_rays(buffer)
-    for name in hrt.techniques.names():
+    for name in hrt.TECHNIQUES:
         hrt.march(rays, hrt.prepare(buffer, name))
 
 
 def _rays(rays: hrt.Rays) -> None:
-    for name in hrt.techniques.names():
+    for name in hrt.TECHNIQUES:
         hrt.march(rays, hrt.prepare(of.gbuffer(), name))
     hrt.trace_hybrid(rays, of.screen(), of.tracer())
     of.truth().nearest(rays.take(slice(0, 3)))

@@ -55,6 +55,7 @@ from hybrid_rt.kernels.techniques.screen import (
     HIT,
     INF,
     INVALID,
+    LARGEST_T,
     MISS,
     OFFSCREEN,
     UNDECIDED,
@@ -228,11 +229,15 @@ def apart(planes, prim, s, s_exit, x0, y0, z0, sx, sy, sz, z_error):
 
 @inlined
 def walk(
-    i, origin, direction, ray, t_near, t_far, status, x, y, depth, dx, dy, dz, s_end, z, gz,
-    prim_id, nearest, rest, planes, cells, offsets, pitches, vertices, faces,
-    max_steps, max_tests, any_hit, steps_by_level,
+    o, d, t_near, t_far, ray, lists, pyramid, scene, limits, steps_by_level
 ):  # fmt: skip
     """March one ray; return (status, pixel x, pixel y, prim, t, s proven free, steps, tests)."""
+    status, x, y, depth, dx, dy, dz, s_end, z, gz = ray
+    prim_id, nearest, rest, planes = lists
+    cells, offsets, pitches = pyramid
+    vertices, faces, _ = scene
+    max_steps, max_tests, any_hit = limits
+    shear = frame(d)
     height, width, length = prim_id.shape
     top = offsets.shape[0] - 1
     scale = max(abs(dx), abs(dy), 1.0 / s_end)
@@ -243,7 +248,6 @@ def walk(
     x0, y0 = F(x), F(y)
     z0 = start_depth(depth, dz, s_end)
     z_error = depth_error(depth, dz, s_end)
-    o = origin[i]
 
     best = -1
     best_low, best_high = math.inf, t_far
@@ -287,7 +291,7 @@ def walk(
                 tests += 1
                 last = prim
                 found, low, high = test_primitive(
-                    o, ray, vertices, faces[prim, 0], faces[prim, 1], faces[prim, 2],
+                    o, shear, vertices, faces[prim, 0], faces[prim, 1], faces[prim, 2],
                     t_near, min(t_far, best_high),
                 )  # fmt: skip
                 if found == T_MISS:
@@ -335,74 +339,62 @@ def walk(
 
 @called
 def march_chunk(
-    first, last, origin, direction, t_near, t_far, prim_id, nearest, rest, planes,
-    cells, offsets, pitches, vertices, faces, m, eye, near, spread, low, high,
-    max_steps, max_tests, any_hit,
-    status, resolved, pixel, prim, t, t_free, steps, steps_by_level, tests,
+    first, last, rays, box, lists, pyramid, scene, limits, out, steps_by_level, tests
 ):  # fmt: skip
     """Set up rays in float64, walk them in float32 and write their rows of the outputs."""
-    height, width = rest.shape
+    height, width = lists.rest.shape
     for i in range(first, last):
-        start, stop = np.float64(t_near[i]), np.float64(t_far[i])
+        o, d = rays.origin[i], rays.direction[i]
+        start, stop = np.float64(rays.t_near[i]), np.float64(rays.t_far[i])
         how, x, y, z0, dx, dy, dz, s_end, z, gz = place(
-            np.float64(origin[i, 0]), np.float64(origin[i, 1]), np.float64(origin[i, 2]),
-            np.float64(direction[i, 0]), np.float64(direction[i, 1]), np.float64(direction[i, 2]),
-            start, math.inf, m, eye, near, width, height,
+            np.float64(o[0]), np.float64(o[1]), np.float64(o[2]),
+            np.float64(d[0]), np.float64(d[1]), np.float64(d[2]),
+            start, math.inf, box.m, box.eye, box.near, width, height,
         )  # fmt: skip
         if how != INVALID and not stop >= start:
             how, s_end = INVALID, -1.0
         hit_x, hit_y, found, at, s_free, count, tested = -1, -1, -1, math.inf, 0.0, 0, 0
         if s_end >= 0.0:
-            how, s_end, some = clip_end(
-                how, s_end, start, stop, z, gz, origin[i], direction[i], low, high
-            )
+            how, s_end, some = clip_end(how, s_end, start, stop, z, gz, o, d, box.low, box.high)
             if not some:
                 pass
-            elif not (s_end < math.inf) or not trusted(
-                origin[i], direction[i], start, eye, z, s_end, spread
-            ):
+            elif not (s_end < math.inf) or not trusted(o, d, start, box.eye, z, s_end, box.spread):
                 how = UNDECIDED
             else:
                 how, hit_x, hit_y, found, at, s_free, count, tested = walk(
-                    i, origin, direction, frame(direction[i]), start, stop, how,
-                    x, y, z0, dx, dy, dz, s_end, z, gz,
-                    prim_id, nearest, rest, planes, cells, offsets, pitches, vertices, faces,
-                    max_steps, max_tests, any_hit, steps_by_level,
+                    o, d, start, stop, (how, x, y, z0, dx, dy, dz, s_end, z, gz),
+                    lists, pyramid, scene, limits, steps_by_level,
                 )  # fmt: skip
         tests[0] += tested
-        status[i] = how
-        resolved[i] = how in (HIT, MISS)
-        pixel[i, 0] = hit_x
-        pixel[i, 1] = hit_y
-        prim[i] = found
-        t[i] = at
-        steps[i] = count
+        out.status[i] = how
+        out.resolved[i] = how in (HIT, MISS)
+        out.pixel[i, 0] = hit_x
+        out.pixel[i, 1] = hit_y
+        out.prim_id[i] = found
+        out.t[i] = min(at, LARGEST_T) if found >= 0 else math.inf
+        out.steps[i] = count
         if how == MISS:
-            t_free[i] = stop
+            out.t_free[i] = stop
         elif s_end < 0.0:
-            t_free[i] = 0.0
+            out.t_free[i] = 0.0
         else:
             # Rounded down: what is proven is proven up to here at least.
             free = ray_t(s_free / BEYOND, z, gz, start)
-            t_free[i] = F(min(free * (1.0 - 2.0**-22), stop))
+            out.t_free[i] = F(min(free * (1.0 - 2.0**-22), stop))
 
 
 @parallel_kernel
-def march(
-    share, origin, direction, t_near, t_far, prim_id, nearest, rest, planes,
-    cells, offsets, pitches, vertices, faces, m, eye, near, spread, low, high,
-    max_steps, max_tests, any_hit,
-    status, resolved, pixel, prim, t, t_free, steps, steps_by_level, tests,
-):  # fmt: skip
-    """March rays (N, 3); outputs (N,), steps_by_level (workers, L), tests (workers, 1)."""
-    n = origin.shape[0]
+def march(share, rays, box, lists, pyramid, scene, limits, out, steps_by_level, tests):
+    """March rays; out (N,), steps_by_level (workers, L), tests (workers, 1).
+
+    rays, lists, pyramid, scene, out: as in `hybrid_rt.kernels.arrays`; limits: (steps, tests, is
+    any hit an answer).
+    """
+    n = len(rays.t_near)
     first = take(share, CHUNK)
     while first < n:
         march_chunk(
-            first, min(n, first + CHUNK), origin, direction, t_near, t_far,
-            prim_id, nearest, rest, planes, cells, offsets, pitches, vertices, faces,
-            m, eye, near, spread, low, high, max_steps, max_tests, any_hit,
-            status, resolved, pixel, prim, t, t_free, steps, steps_by_level[share.worker],
-            tests[share.worker],
+            first, min(n, first + CHUNK), rays, box, lists, pyramid, scene, limits, out,
+            steps_by_level[share.worker], tests[share.worker],
         )  # fmt: skip
         first = take(share, CHUNK)

@@ -34,6 +34,7 @@ from hybrid_rt.kernels.techniques.certified.slots import (
 )
 from hybrid_rt.kernels.techniques.screen import (
     HIT,
+    LARGEST_T,
     MISS,
     UNDECIDED,
 )
@@ -72,7 +73,7 @@ def write(many, slots_f, slots_i, slots_d, out):
         below = 1.0 - s_free * gz
         free = simd.select(below <= 0.0, INFINITY, start + s_free * z / below)
         free = simd.select(miss, stop, simd.minimum(free * (1.0 - 2.0**-22), stop))
-        middle = simd.select(hit, 0.5 * (low + high), INFINITY)
+        middle = simd.select(hit, simd.minimum(0.5 * (low + high), LARGEST_T), INFINITY)
         simd.scatter(prim_id, i, simd.select(hit, best, I32(-1)), live)
         simd.scatter(t, i, simd.to_f32(middle), live)
         simd.scatter(t_free, i, simd.to_f32(free), live)
