@@ -39,7 +39,7 @@ class _Job:
         """Do the work; `wait` returns then, or raises what went wrong."""
         try:
             self._work()
-        except BaseException as error:  # noqa: BLE001: whoever waits for it raises it
+        except BaseException as error:  # whoever waits for it raises it
             self._error = error
         finally:
             self._done.release()
@@ -91,10 +91,11 @@ if hasattr(os, "register_at_fork"):
 def on_all_threads(kernel: Any) -> Any:
     """Return a function that runs a kernel on as many threads as `numba.get_num_threads` says.
 
-    The kernel takes a `Share` before the arguments of the function, and returns nothing.
+    Its attribute `kernel` is that kernel, which takes a `Share` before the arguments of the
+    function and returns nothing.
     """
 
-    @functools.wraps(kernel)
+    @functools.wraps(kernel.py_func)
     def run(*arguments: Any) -> None:
         workers = numba.get_num_threads()
         counter = np.zeros(1, np.int64)
@@ -111,4 +112,5 @@ def on_all_threads(kernel: Any) -> Any:
             for job in jobs:
                 job.wait()
 
+    run.kernel = kernel  # type: ignore[attr-defined]
     return run
