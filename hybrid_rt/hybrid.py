@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from hybrid_rt import _check, _threads
-from hybrid_rt.base import ANY, NEAREST, Screen, Tracer, check_rays, check_tracer
+from hybrid_rt.base import ANY, NEAREST, Screen, Tracer, check_tracer
 from hybrid_rt.kernels import hybrid as kernels
 from hybrid_rt.kernels.arrays import F32, I32, U8, Bool
 from hybrid_rt.rays.hits import Hits
@@ -123,7 +123,8 @@ def trace_hybrid(
     their hits into their rows of the result, and "merge" those of the others. `timings` holds
     wall-clock seconds, without JIT compilation only from the second call on.
     """
-    _check_parts(rays, screen, tracer, NEAREST, "intersect")
+    _check.instance("screen", screen, Screen)
+    check_tracer(tracer, screen.scene, NEAREST, "intersect")
     faces = len(screen.scene)
 
     def trace(traced: Rays, indices: I32) -> Hits:
@@ -181,7 +182,8 @@ def occluded_hybrid(
     -----
     As for `trace_hybrid`.
     """
-    _check_parts(rays, screen, tracer, ANY, "occluded")
+    _check.instance("screen", screen, Screen)
+    check_tracer(tracer, screen.scene, ANY, "occluded")
 
     def trace(traced: Rays, indices: I32) -> Bool:
         occluded = np.empty(len(traced), np.bool_)
@@ -198,14 +200,6 @@ def occluded_hybrid(
         kernels.answer_occlusion(marched.resolved, marched.prim_id, occluded)
 
     return OcclusionResult(*_in_stages(rays, screen, True, trace, merge, threads))
-
-
-def _check_parts(rays: Rays, screen: Screen, tracer: Tracer, query: str, method: str) -> None:
-    """Raise unless rays, screen and tracer belong together, before anything is marched."""
-    _check.instance("rays", rays, Rays)
-    _check.instance("screen", screen, Screen)
-    check_rays(rays, screen.scene, screen.camera)
-    check_tracer(tracer, screen.scene, query, method)
 
 
 def _ours(tracer: Tracer) -> bool:
