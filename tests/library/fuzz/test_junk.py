@@ -11,7 +11,7 @@ import pytest
 
 import hybrid_rt as hrt
 from support.fuzz import examples
-from support.fuzz.run import calls, fuzz, sample
+from support.fuzz.run import calls, extremes, fuzz, sample
 from support.fuzz.targets import targets
 
 SHARE = float(os.environ.get("HYBRID_RT_FUZZ", "0.2"))
@@ -27,6 +27,12 @@ def ended():
 def test_no_crash_no_hang_no_bare_exception(ended):
     faults = [f"{e.call}: {e.outcome}" for e in ended if e.fault]
     assert not faults, "\n".join([f"{len(faults)} faults in {len(ended)} calls", *faults])
+
+
+def test_what_is_allowed_and_extreme_is_answered_or_refused():
+    tried = fuzz(extremes(range(1000 * SEED, 1000 * SEED + round(400 * SHARE))))
+    faults = [f"{e.call}: {e.outcome}" for e in tried if e.fault]
+    assert not faults, "\n".join([f"{len(faults)} faults in {len(tried)} calls", *faults])
 
 
 def test_most_junk_is_refused(ended):
