@@ -263,10 +263,10 @@ class EmbreeTracer:
             rows = rows_at(indices)
             hits.put(rows, self._bvh.embreex.intersect(rays.take(rows), self.threads))
             return
-        with _threads.limited(self.threads) as workers:
+        with _threads.limited(self.threads):
             self._bvh.native.intersect(
                 rays, hits, indices, width=self._width, coherent=self._coherent,
-                by_direction=self._order == "direction", workers=workers,
+                by_direction=self._order == "direction",
             )  # fmt: skip
 
     def _occluded(self, rays: Rays, hit: Bool, indices: I32 | None) -> None:
@@ -274,10 +274,10 @@ class EmbreeTracer:
             rows = rows_at(indices)
             hit[rows] = self._bvh.embreex.occluded(rays.take(rows), self.threads)
             return
-        with _threads.limited(self.threads) as workers:
+        with _threads.limited(self.threads):
             self._bvh.native.occluded(
                 rays, hit, indices, width=self._width, coherent=self._coherent,
-                by_direction=self._order == "direction", workers=workers,
+                by_direction=self._order == "direction",
             )  # fmt: skip
 
 

@@ -167,15 +167,11 @@ class NativeScene:
         width: int,
         coherent: bool,
         by_direction: bool,
-        workers: int,
     ) -> None:
-        """Write the nearest hits of the rays at `indices`, or of all, into their rows of `hits`.
-
-        `workers` is the number of Numba threads in use.
-        """
+        """Write the nearest hits of the rays at `indices`, or of all, into their rows of `hits`."""
         arguments = _query_arguments(coherent)
         kernels.intersect(
-            _address(f"rtcIntersect{width}"), self._scene, arguments.ctypes.data, width, workers,
+            _address(f"rtcIntersect{width}"), self._scene, arguments.ctypes.data, width,
             indices is not None, _NO_INDICES if indices is None else indices, by_direction,
             *_without_pixel(rays), *hits.arrays,
         )  # fmt: skip
@@ -190,12 +186,11 @@ class NativeScene:
         width: int,
         coherent: bool,
         by_direction: bool,
-        workers: int,
     ) -> None:
         """Write whether rays hit anything; as `intersect`."""
         arguments = _query_arguments(coherent)
         kernels.occluded(
-            _address(f"rtcOccluded{width}"), self._scene, arguments.ctypes.data, width, workers,
+            _address(f"rtcOccluded{width}"), self._scene, arguments.ctypes.data, width,
             indices is not None, _NO_INDICES if indices is None else indices, by_direction,
             *_without_pixel(rays), hit,
         )  # fmt: skip

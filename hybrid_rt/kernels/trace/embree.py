@@ -16,13 +16,13 @@ import math
 
 import numpy as np
 from llvmlite import ir
-from numba import prange, types
+from numba import types
 from numba.extending import intrinsic
 
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._aligned import aligned
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
-from hybrid_rt.kernels._queue import fetch_add
+from hybrid_rt.kernels._queue import take
 from hybrid_rt.kernels.simd import WIDTH
 
 SCALE = 21
@@ -279,7 +279,7 @@ def _query(function, scene, arguments, width, packet, valid):
 
 @parallel_kernel
 def intersect(
-    function, scene, arguments, width, workers, indexed, indices, by_direction,
+    share, function, scene, arguments, width, indexed, indices, by_direction,
     origin, direction, t_near, t_far,
     t, prim_id, u, v, n_g,
 ):  # fmt: skip
@@ -288,63 +288,54 @@ def intersect(
     `function`, `scene` and `arguments` are addresses: the call for `width`, the RTCScene and the
     RTCIntersectArguments. With `indexed` only the rays at `indices` (M,) int32 are traced, in that
     order, and no other row is written. With `by_direction` those of a chunk are traced sorted by
-    where they go. `workers` threads take chunks of rays from a common counter, since a chunk of sky
-    costs a fraction of a chunk of foliage; which thread traces a ray does not show.
+    where they go. Which thread traces a ray does not show.
     """
     count = len(indices) if indexed else len(origin)
     in_order = not (indexed or by_direction)
-    taken = np.zeros(1, np.int64)
-    for _ in prange(workers):
-        packet, words, valid = _packet(width)
-        queue, keys, ends = _queue()
-        start = fetch_add(taken.ctypes.data, CHUNK)
-        while start < count:
-            length = min(CHUNK, count - start)
-            _take(
-                start, start + length, indexed, indices, by_direction, direction, queue, keys, ends
-            )
-            for first in range(0, length, width):
-                if _load(
-                    first, length, width, in_order, queue,
-                    origin, direction, t_near, t_far, packet, words, valid,
-                ):  # fmt: skip
-                    _query(function, scene, arguments, width, packet, valid)
-                _store(first, length, width, in_order, queue, packet, words, t, prim_id, u, v, n_g)
-            start = fetch_add(taken.ctypes.data, CHUNK)
+    packet, words, valid = _packet(width)
+    queue, keys, ends = _queue()
+    start = take(share, CHUNK)
+    while start < count:
+        length = min(CHUNK, count - start)
+        _take(start, start + length, indexed, indices, by_direction, direction, queue, keys, ends)
+        for first in range(0, length, width):
+            if _load(
+                first, length, width, in_order, queue,
+                origin, direction, t_near, t_far, packet, words, valid,
+            ):  # fmt: skip
+                _query(function, scene, arguments, width, packet, valid)
+            _store(first, length, width, in_order, queue, packet, words, t, prim_id, u, v, n_g)
+        start = take(share, CHUNK)
 
 
 @parallel_kernel
 def occluded(
-    function, scene, arguments, width, workers, indexed, indices, by_direction,
+    share, function, scene, arguments, width, indexed, indices, by_direction,
     origin, direction, t_near, t_far,
     hit,
 ):  # fmt: skip
     """Whether (N, 3) rays hit anything, by rtcOccluded1/4/8/16; arguments as in `intersect`."""
     count = len(indices) if indexed else len(origin)
     in_order = not (indexed or by_direction)
-    taken = np.zeros(1, np.int64)
-    for _ in prange(workers):
-        packet, words, valid = _packet(width)
-        queue, keys, ends = _queue()
-        start = fetch_add(taken.ctypes.data, CHUNK)
-        while start < count:
-            length = min(CHUNK, count - start)
-            _take(
-                start, start + length, indexed, indices, by_direction, direction, queue, keys, ends
-            )
-            for first in range(0, length, width):
-                if _load(
-                    first, length, width, in_order, queue,
-                    origin, direction, t_near, t_far, packet, words, valid,
-                ):  # fmt: skip
-                    _query(function, scene, arguments, width, packet, valid)
-                for k in range(width):
-                    if first + k >= length:
-                        break
-                    # Embree writes tfar = -inf for an occluded ray and leaves a masked lane alone.
-                    i = np.uint64(queue[first + k])
-                    hit[i] = packet[8 * width + k] == -np.inf
-            start = fetch_add(taken.ctypes.data, CHUNK)
+    packet, words, valid = _packet(width)
+    queue, keys, ends = _queue()
+    start = take(share, CHUNK)
+    while start < count:
+        length = min(CHUNK, count - start)
+        _take(start, start + length, indexed, indices, by_direction, direction, queue, keys, ends)
+        for first in range(0, length, width):
+            if _load(
+                first, length, width, in_order, queue,
+                origin, direction, t_near, t_far, packet, words, valid,
+            ):  # fmt: skip
+                _query(function, scene, arguments, width, packet, valid)
+            for k in range(width):
+                if first + k >= length:
+                    break
+                # Embree writes tfar = -inf for an occluded ray and leaves a masked lane alone.
+                i = np.uint64(queue[first + k])
+                hit[i] = packet[8 * width + k] == -np.inf
+        start = take(share, CHUNK)
 
 
 @kernel
