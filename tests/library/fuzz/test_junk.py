@@ -62,6 +62,8 @@ def test_every_public_name_is_fuzzed():
 def test_valid_arguments_are_accepted():
     """What is replaced by junk is right: otherwise the junk would hardly be looked at."""
     for target in targets():
+        if target.label == "Screen":  # only `prepare` makes any
+            continue
         function = target.get()
         try:
             function(**examples.arguments(target.label, function))
