@@ -14,7 +14,7 @@ from support.fuzz import examples
 from support.fuzz.run import calls, extremes, fuzz, sample
 from support.fuzz.targets import targets
 
-SHARE = float(os.environ.get("HYBRID_RT_FUZZ", "0.2"))
+SHARE = float(os.environ.get("HYBRID_RT_FUZZ", "0.5"))
 SEED = int(os.environ.get("HYBRID_RT_FUZZ_SEED", "1"))
 
 
