@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 
 class Share(NamedTuple):
@@ -27,10 +28,13 @@ class Share(NamedTuple):
 
 
 class _Job:
-    """A share of a call, for another thread to work on."""
+    """A share of a call, for another thread to work on.
 
-    def __init__(self, work: Callable[[], object]) -> None:
-        self._work = work
+    `counter` is what the share's address leads to: an interrupted caller may be gone before.
+    """
+
+    def __init__(self, work: Callable[[], object], counter: NDArray[np.int64]) -> None:
+        self._work, self._counter = work, counter
         self._done = threading.Lock()
         self._done.acquire()
         self._error: BaseException | None = None
@@ -101,7 +105,7 @@ def on_all_threads(kernel: Any) -> Any:
         counter = np.zeros(1, np.int64)
         address = counter.ctypes.data
         jobs = [
-            _Job(functools.partial(kernel, Share(worker, workers, address), *arguments))
+            _Job(functools.partial(kernel, Share(worker, workers, address), *arguments), counter)
             for worker in range(1, workers)
         ]
         _team.give(jobs)

@@ -14,7 +14,7 @@ from support.fuzz import examples
 from support.fuzz.run import calls, extremes, fuzz, sample
 from support.fuzz.targets import targets
 
-SHARE = float(os.environ.get("HYBRID_RT_FUZZ", "0.2"))
+SHARE = float(os.environ.get("HYBRID_RT_FUZZ", "0.5"))
 SEED = int(os.environ.get("HYBRID_RT_FUZZ_SEED", "1"))
 
 
@@ -62,6 +62,8 @@ def test_every_public_name_is_fuzzed():
 def test_valid_arguments_are_accepted():
     """What is replaced by junk is right: otherwise the junk would hardly be looked at."""
     for target in targets():
+        if target.label == "Screen":  # only `prepare` makes any
+            continue
         function = target.get()
         try:
             function(**examples.arguments(target.label, function))
