@@ -164,6 +164,15 @@ def vector3(argument: str, value: Any) -> tuple[float, float, float]:
     return float(arr[0]), float(arr[1]), float(arr[2])
 
 
+def point3(argument: str, value: Any) -> tuple[float, float, float]:
+    """Return `value` as three floats within float32, as vertices have them."""
+    point = vector3(argument, value)
+    if max(map(abs, point)) > float(np.finfo(np.float32).max):
+        expected = "coordinates within float32, as vertices have them"
+        raise ArgumentError(argument, expected, describe(value))
+    return point
+
+
 def real(
     argument: str,
     value: Any,

@@ -85,6 +85,10 @@ class Point:
     label: str
     technique: Technique
 
+    def __post_init__(self) -> None:
+        _check.text("label", self.label)
+        _check.instance("technique", self.technique, Technique)
+
     @property
     def name(self) -> str:
         """The technique's name."""

@@ -37,7 +37,9 @@ class Registry(Mapping[str, Thing], Generic[Thing]):
     """
 
     def __init__(self, what: str, group: str, package: str = "") -> None:
-        self.what, self.group, self.package = what, group, package
+        self.what = _check.text("what", what)
+        self.group = _check.text("group", group)
+        self.package = _check.text("package", package)
         self._things: dict[str, Thing] = {}
         self._broken: dict[str, PluginError] = {}
         self._looked = False

@@ -50,7 +50,8 @@ class Camera:
 
     def __post_init__(self) -> None:
         checked = {
-            **{name: _check.vector3(name, getattr(self, name)) for name in ("eye", *AXES)},
+            "eye": _check.point3("eye", self.eye),
+            **{name: _check.vector3(name, getattr(self, name)) for name in AXES},
             "vfov_deg": _check.real("vfov_deg", self.vfov_deg, above=NARROWEST, below=180.0),
             "width": _check.integer("width", self.width, least=1, most=LARGEST_SIDE),
             "height": _check.integer("height", self.height, least=1, most=LARGEST_SIDE),
@@ -58,9 +59,6 @@ class Camera:
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
-        if max(map(abs, self.eye)) > float(np.finfo(np.float32).max):
-            expected = "coordinates within float32, as vertices have them"
-            raise ArgumentError("eye", expected, _check.describe(self.eye))
         axes = np.array([self.right, self.up, self.forward])
         for k, name in enumerate(AXES):
             long = np.abs(axes[k]).max() > 2.0

@@ -36,6 +36,8 @@ class Rate:
             return cls(0, 0, 0.0, 1.0)
         if count == 0:
             return cls(0, total, 0.0, min(1.0, 3.0 / total))
+        # scipy.stats.binomtest finds the same ends, but to 2e-12 only: a fifth of a per mille of
+        # the lower one for a single error among 230 million.
         low = float(stats.beta.ppf(0.025, count, total - count + 1))
         high = float(stats.beta.ppf(0.975, count + 1, total - count)) if count < total else 1.0
         return cls(count, total, low, high)

@@ -57,6 +57,7 @@ class GBuffer(Record):
     def __post_init__(self) -> None:
         _check.instance("scene", self.scene, Scene)
         _check.instance("camera", self.camera, Camera)
+        _check.instance("timings", self.timings, dict)
         shape = self.camera.height, self.camera.width
         images = {
             name: _check.owned(name, getattr(self, name), shape, np.float32)

@@ -25,7 +25,7 @@ class PointLight:
     position: Vector
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position", _check.vector3("position", self.position))
+        object.__setattr__(self, "position", _check.point3("position", self.position))
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,12 @@ class AreaLight:
 
     def __post_init__(self) -> None:
         for name in ("corner", "edge_u", "edge_v"):
-            object.__setattr__(self, name, _check.vector3(name, getattr(self, name)))
-        if not np.cross(self.edge_u, self.edge_v).any():
+            object.__setattr__(self, name, _check.point3(name, getattr(self, name)))
+        u, v = np.array(self.edge_u), np.array(self.edge_v)
+        _check.point3("edge_u", np.array(self.corner) + u)
+        _check.point3("edge_v", np.array(self.corner) + v)
+        _check.point3("edge_v", np.array(self.corner) + u + v)
+        if not np.cross(u, v).any():
             raise ArgumentError(
                 "edge_v", "an edge that is not parallel to edge_u", _check.describe(self.edge_v)
             )

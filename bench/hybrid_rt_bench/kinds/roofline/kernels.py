@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._jit import kernel, parallel_kernel
@@ -67,21 +66,18 @@ def load_some(table, bits, vectors, seed):
 
 
 @parallel_kernel
-def gather_all(workers, table, bits, vectors, sums):
+def gather_all(share, table, bits, vectors, sums):
     """Have every worker gather; sums (workers,) float32."""
-    for worker in prange(workers):
-        sums[worker] = gather_some(table, bits, vectors, worker + 1)
+    sums[share.worker] = gather_some(table, bits, vectors, share.worker + 1)
 
 
 @parallel_kernel
-def chain_all(workers, table, bits, vectors, sums):
+def chain_all(share, table, bits, vectors, sums):
     """Have every worker follow its chain; sums (workers,) float32."""
-    for worker in prange(workers):
-        sums[worker] = chain_some(table, bits, vectors, worker + 1)
+    sums[share.worker] = chain_some(table, bits, vectors, share.worker + 1)
 
 
 @parallel_kernel
-def load_all(workers, table, bits, vectors, sums):
+def load_all(share, table, bits, vectors, sums):
     """Have every worker load; sums (workers,) float32."""
-    for worker in prange(workers):
-        sums[worker] = load_some(table, bits, vectors, worker + 1)
+    sums[share.worker] = load_some(table, bits, vectors, share.worker + 1)

@@ -91,7 +91,7 @@ def measure(
                     times = []
                     for _ in range(repeats):
                         start = clock()
-                        KINDS[kind](workers, table, bits, enough[kind], np.zeros(workers, F32))
+                        KINDS[kind](table, bits, enough[kind], np.zeros(workers, F32))
                         times.append(clock() - start)
                     ns = 1e9 * min(times) / enough[kind]
                     rows.append(
@@ -118,7 +118,7 @@ def _enough(
     while took < seconds:
         vectors *= 2
         start = clock()
-        run(1, table, bits, vectors, sums)
+        run(table, bits, vectors, sums)
         took = clock() - start
     return vectors
 
