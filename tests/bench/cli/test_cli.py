@@ -186,7 +186,7 @@ def test_list_and_info_tell_what_is_there():
         "shadow_area",
     ):
         assert word in listed.stdout
-    for word in ("embree", "threading layer", "numba", "cpu"):
+    for word in ("embree", "numba", "cpu"):
         assert word in told.stdout
 
 
