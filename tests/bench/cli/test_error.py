@@ -90,10 +90,10 @@ def test_a_run_is_measured_kept_and_shown_again(monkeypatch, capsys, tmp_path, e
 def test_a_cell_that_raises_costs_only_itself(monkeypatch, capsys, tmp_path, experiment):
     measure_cell = error_cell.measure_cell
 
-    def breaks(loaded, view, cell, *rest):
-        if len(view.scene) > 100 and view.camera.width == 64 and cell.picture:
+    def breaks(loaded, screens, cell, *rest):
+        if len(loaded.scene) > 100 and screens.gbuffer.camera.width == 64 and cell.picture:
             raise RuntimeError("the lens fell off")
-        return measure_cell(loaded, view, cell, *rest)
+        return measure_cell(loaded, screens, cell, *rest)
 
     monkeypatch.setattr(error_cell, "measure_cell", breaks)
     code, out, err = run(
