@@ -95,10 +95,11 @@ if hasattr(os, "register_at_fork"):
 def on_all_threads(kernel: Any) -> Any:
     """Return a function that runs a kernel on as many threads as `numba.get_num_threads` says.
 
-    The kernel takes a `Share` before the arguments of the function, and returns nothing.
+    Its attribute `kernel` is that kernel, which takes a `Share` before the arguments of the
+    function and returns nothing.
     """
 
-    @functools.wraps(kernel)
+    @functools.wraps(kernel.py_func)
     def run(*arguments: Any) -> None:
         workers = numba.get_num_threads()
         counter = np.zeros(1, np.int64)
@@ -115,4 +116,5 @@ def on_all_threads(kernel: Any) -> Any:
             for job in jobs:
                 job.wait()
 
+    run.kernel = kernel  # type: ignore[attr-defined]
     return run

@@ -120,7 +120,8 @@ rays = hrt.Rays.from_arrays(np.zeros((20, 3)), np.tile([(0.0, 0, -1)], (20, 1)))
 tracer = hrt.EmbreeTracer(scene)
 for width in (1, 4, 8, 16):
     assert (tracer.with_path(width=width).intersect(rays).prim_id == 0).all()
-print(len(kernels.intersect.signatures), sum(kernels.intersect.stats.cache_hits.values()))
+kernel = kernels.intersect.kernel
+print(len(kernel.signatures), sum(kernel.stats.cache_hits.values()))
 """
 
 
