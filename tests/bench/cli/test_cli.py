@@ -135,6 +135,7 @@ def test_report_renders_an_old_run_and_compare_compares_it(finished, monkeypatch
     assert "no difference shown" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_finished_cells(tmp_path):
     process = subprocess.Popen(
         command(
@@ -160,6 +161,7 @@ def test_ctrl_c_keeps_finished_cells(tmp_path):
     assert "not finished" in (folder / "tables.md").read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["status", "all"])
 def test_render_writes_a_picture(tmp_path, what):
     path = tmp_path / "x.png"
@@ -241,6 +243,7 @@ def test_nothing_left_to_run_gives_code_3(usage_error, monkeypatch, tmp_path):
     assert usage_error("render", "sponza", "-o", tmp_path / "x.png", code=3)
 
 
+@pytest.mark.slow
 def test_a_cell_that_raises_costs_only_itself(monkeypatch, capsys, tmp_path):
     measure_cell = measure.measure_cell
 
@@ -263,6 +266,7 @@ def test_a_cell_that_raises_costs_only_itself(monkeypatch, capsys, tmp_path):
     assert [row["camera"] for row in summary["results"]] == ["front", "above"]
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_up_keeps_what_was_written(monkeypatch, capsys, tmp_path):
     replace, renamed = os.replace, []
 

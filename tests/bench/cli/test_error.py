@@ -51,6 +51,7 @@ def experiment(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_a_run_is_measured_kept_and_shown_again(monkeypatch, capsys, tmp_path, experiment):
     code, out, err = run(
         monkeypatch, capsys, "run", experiment, "--threads", 1, "--out", tmp_path, "--json"
@@ -87,6 +88,7 @@ def test_a_run_is_measured_kept_and_shown_again(monkeypatch, capsys, tmp_path, e
     assert (folder / "tables.md").read_text() == text
 
 
+@pytest.mark.slow
 def test_a_cell_that_raises_costs_only_itself(monkeypatch, capsys, tmp_path, experiment):
     measure_cell = error_cell.measure_cell
 
@@ -106,6 +108,7 @@ def test_a_cell_that_raises_costs_only_itself(monkeypatch, capsys, tmp_path, exp
     assert (summary["measured"], summary["failed"]) == (7, 1)
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_what_is_finished(monkeypatch, capsys, tmp_path, experiment):
     measure_cell, done = error_cell.measure_cell, []
 
@@ -144,6 +147,7 @@ def test_wrong_settings_are_refused_before_measuring(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "points", "title"),
     [
