@@ -767,8 +767,8 @@ PROGRAM = """
 import sys
 import numpy as np
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
-from hybrid_rt.kernels._queue import part
 from hybrid_rt.kernels.simd import *
+from hybrid_rt.kernels._queue import part  # simd has one too
 
 @inlined
 def both(x, y):
