@@ -59,18 +59,20 @@ class Dot:
 
 
 def plots(run: RunData, folder: Path) -> list[Path]:
-    """Write every plot of a run into `folder` and return their paths."""
-    return save_all(
-        run,
-        folder,
-        (
-            ("speed-against-error", speed_against_error),
-            ("march-rate-against-error", march_rate_against_error),
-            ("speed-against-error-by-scene", speed_by_scene),
-            ("alpha-by-workload", alpha_by_workload),
-            ("speedup-by-workload", speedup_by_workload),
-        ),
-    )
+    """Write every plot of a run into `folder` and return their paths.
+
+    Where nothing was timed there is no speed to be shown.
+    """
+    of_counts: list[tuple[str, Callable[[RunData], Figure]]] = [
+        ("alpha-by-workload", alpha_by_workload)
+    ]
+    of_times: list[tuple[str, Callable[[RunData], Figure]]] = [
+        ("speed-against-error", speed_against_error),
+        ("march-rate-against-error", march_rate_against_error),
+        ("speed-against-error-by-scene", speed_by_scene),
+        ("speedup-by-workload", speedup_by_workload),
+    ]
+    return save_all(run, folder, of_counts + (of_times if run.results["timed"].any() else []))
 
 
 def speed_against_error(run: RunData) -> Figure:
@@ -338,7 +340,8 @@ def _bars(
     run: RunData, label: str, height: Callable[[Pooled], tuple[float, float, float]]
 ) -> Figure:
     """Return grouped bars: workloads along the axis, the techniques' default points in each."""
-    rows = tables.defaults(tables.timed(run))
+    timed = tables.timed(run)
+    rows = tables.defaults(timed if len(timed) else run.results)
     rows = rows[rows.technique != EMBREE]
     pooled = pools(rows, ["workload", "technique"])
     workloads = list(dict.fromkeys(key[0] for key in pooled))

@@ -222,7 +222,7 @@ class _Run:
     def _eta(self) -> str:
         left = (time.monotonic() - self.started) * (self.total / max(self.done, 1e-9) - 1)
         share = 100 * self.done / self.total
-        return f"; {share:.0f} % done, about {left / 60:.0f} min left"
+        return f"; {share:.0f} % done, about {max(left, 0.0) / 60:.0f} min left"
 
 
 def _screens(scene: hrt.Scene, camera: hrt.Camera, threads: int) -> Screens:

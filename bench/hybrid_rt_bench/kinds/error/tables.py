@@ -18,8 +18,8 @@ from hybrid_rt_bench.results.folder import RunData
 
 
 def tables(run: RunData) -> list[Table]:
-    """Return every table of the run, in the order of reading."""
-    return [
+    """Return every table of the run that has rows, in the order of reading."""
+    every = [
         table_main(run),
         table_scenes(run),
         table_workloads(run),
@@ -30,3 +30,4 @@ def tables(run: RunData) -> list[Table]:
         table_t_error(run),
         *table_image(run),
     ]
+    return [table for table in every if table.rows]
