@@ -46,8 +46,9 @@ def build(share, depth, offsets, pitches, widths, heights, data):
         end = min(begin + rows, height)
         for y in range(begin, end):
             start = offsets[0] + y * pitches[0]
+            cells, line = data[start : start + width], depth[y]
             for x in range(width):  # an assignment of slices would compile what it raises
-                data[start + x] = depth[y, x]
+                cells[x] = line[x]
         for level in range(1, low + 1):
             first = begin >> level
             last = min((band + 1) * (rows >> level), heights[level])
