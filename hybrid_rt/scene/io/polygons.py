@@ -1,0 +1,164 @@
+"""Triangles from polygons, of whatever shape.
+
+A polygon with n corners becomes n - 2 triangles around its first corner, as most readers do it,
+wherever these do not overlap; else around its second corner (a quad's other diagonal); else by
+`mapbox_earcut`, Mapbox's ear cutting in C++, which is kept and used widely and takes concave
+polygons and holes that a bridge connects to the rim. Earcut promises no right answer, hence its
+triangles count only when their areas add up to the polygon's, the sum of cross products along its
+rim. It leaves out corners that lie on a straight edge.
+
+A polygon need not be plane: corners are judged along the normal that its rim has on average
+(Newell). One without area, all corners on a line, becomes triangles without area. One that
+crosses itself has no inside that files define, and is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid_rt.scene.io.fault import FormatError
+from hybrid_rt.scene.io.words import F64, I64
+
+_BLOCK = 1 << 18  # corners at a time
+# Twice an area that float64 differences leave uncertain, and that coordinates rounded to float32
+# do, in units of (largest coordinate) x (extent of the polygon).
+_SURE = 2.0**-48
+_ROUNDED = 2.0**-21
+
+
+def triangulate(
+    vertices: F64, corners: I64, counts: I64, where: Callable[[int], str]
+) -> tuple[I64, I64]:
+    """Return the triangles of polygons, in their order.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float64
+    corners : (C,) int64
+        Indices into `vertices`, checked, of one polygon after the other.
+    counts : (P,) int64
+        How many corners each polygon has, >= 3.
+    where : callable
+        Takes the index of a polygon and says where in the file it is, for the message.
+
+    Returns
+    -------
+    faces : (F, 3) int64
+    polygon_id : (F,) int64
+        From which polygon a triangle comes, ascending.
+
+    Raises
+    ------
+    FormatError
+        A polygon that crosses itself.
+    """
+    if len(counts) == 0 or (counts == 3).all():
+        return corners.reshape(-1, 3), np.arange(len(counts))
+    begin = np.cumsum(counts) - counts
+    faces, owners = [], []
+    for n in np.unique(counts).tolist():
+        alike = np.flatnonzero(counts == n)
+        step = max(1, _BLOCK // n)
+        for some in np.split(alike, range(step, len(alike), step)):
+            rims = corners[begin[some, None] + np.arange(n)]
+            if n == 3:
+                faces.append(rims)
+                owners.append(some)
+                continue
+            for triangles, chosen in _alike(vertices, rims, some, where):
+                faces.append(triangles)
+                owners.append(chosen)
+    owner = np.concatenate(owners)
+    order = np.argsort(owner, kind="stable")
+    return np.concatenate(faces)[order], owner[order]
+
+
+def _alike(
+    vertices: F64, rims: I64, index: I64, where: Callable[[int], str]
+) -> list[tuple[I64, I64]]:
+    """Return triangles of polygons with as many corners, and of which polygon each is."""
+    n = rims.shape[1]
+    points = vertices[rims]
+    fits = np.full(len(rims), -1)
+    for first in (1, 0):
+        fits[_fan_fits(np.roll(points, -first, axis=1))] = first
+    found = []
+    for first in (0, 1):
+        chosen = np.flatnonzero(fits == first)
+        fan = (first + _fan(n)) % n
+        found.append((rims[chosen][:, fan].reshape(-1, 3), np.repeat(index[chosen], n - 2)))
+    for k in np.flatnonzero(fits < 0).tolist():
+        triangles = _one(points[k])
+        if triangles is None:
+            raise FormatError(
+                f"{where(int(index[k]))}: a polygon of {n} corners that crosses itself"
+            )
+        found.append((rims[k][triangles], np.full(len(triangles), index[k])))
+    return found
+
+
+def _fan(n: int) -> I64:
+    k = np.arange(1, n - 1)
+    return np.stack([np.zeros_like(k), k, k + 1], axis=1)
+
+
+def _doubt(points: F64, unit: float) -> F64:
+    """Return twice the area that is uncertain in each polygon; points are (..., n, 3)."""
+    span = np.abs(points - points[..., :1, :]).max(axis=(-2, -1))
+    return np.asarray(unit * np.abs(points).max(axis=(-2, -1)) * span)
+
+
+def _fan_fits(points: F64) -> NDArray[np.bool_]:
+    """Return for which polygons (P, n, 3) the fan around the first corner does not overlap."""
+    rim = points[:, 1:] - points[:, :1]
+    crosses = np.cross(rim[:, :-1], rim[:, 1:])
+    normal = crosses.sum(axis=1)
+    length = np.linalg.norm(normal, axis=1)
+    doubt = _doubt(points, _SURE)
+    up = normal / np.maximum(length, np.finfo(np.float64).tiny)[:, None]
+    signed = np.einsum("pkc,pc->pk", crosses, up)
+    turned = np.arctan2(signed, np.einsum("pkc,pkc->pk", rim[:, :-1], rim[:, 1:])).sum(axis=1)
+    once = turned <= 2 * np.pi + 1e-9
+    return np.asarray((length > doubt) & (signed >= -doubt[:, None]).all(axis=1) & once)
+
+
+def _one(points: F64) -> I64 | None:
+    """Return triangles (F, 3) of a polygon (n, 3) that is no fan, or None if it crosses itself."""
+    import mapbox_earcut  # only files with such polygons need it
+
+    n = len(points)
+    rim = points[1:] - points[:1]
+    crosses = np.cross(rim[:-1], rim[1:])
+    normal = crosses.sum(axis=0)
+    loose = float(_doubt(points, _ROUNDED))
+    if np.linalg.norm(crosses, axis=1).sum() <= loose:
+        return _fan(n)  # nothing but a line
+    axis = int(np.argmax(np.abs(normal)))
+    twice = float(normal[axis])
+    if abs(twice) <= float(_doubt(points, _SURE)):
+        return None
+    flat = np.ascontiguousarray(np.delete(rim, axis, axis=1) if axis != 1 else rim[:, [2, 0]])
+    flat = np.concatenate([np.zeros((1, 2)), flat])
+    cut = mapbox_earcut.triangulate_float64(flat, np.array([n], np.uint32))
+    best: I64 = np.asarray(cut, np.int64).reshape(-1, 3)
+    areas = _twice_areas(flat, best)
+    if areas.sum() * twice < 0:
+        best = best[:, [0, 2, 1]]
+    excess = abs(np.abs(areas).sum() - abs(twice))
+    for first in (0, 1):
+        if excess <= n * float(_doubt(points, _SURE)):
+            break
+        fan = (first + _fan(n)) % n
+        other = abs(np.abs(_twice_areas(flat, fan)).sum() - abs(twice))
+        if other < excess:
+            best, excess = fan, other
+    return best if excess <= loose else None
+
+
+def _twice_areas(flat: F64, triangles: I64) -> F64:
+    a, b, c = (flat[triangles[:, k]] for k in range(3))
+    u, v = b - a, c - a
+    return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
