@@ -62,8 +62,8 @@ def binary_body(
     letters = np.frombuffer(data, np.uint8)
 
     def take(offsets: I64, kind: str) -> NDArray[Any]:
-        width = np.dtype(kind).itemsize
-        block = letters[offsets[:, None] + np.arange(width)]
+        width = int(kind[1])
+        block: NDArray[Any] = letters[offsets[:, None] + np.arange(width)]
         return block.reshape(-1).view(order + kind)
 
     def length(offset: int, kind: str) -> int:

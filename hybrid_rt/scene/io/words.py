@@ -91,7 +91,7 @@ def _gather(text: U8, start: I64, end: I64) -> U8:
     """Return words side by side, with a blank after each."""
     length = end - start + 1
     after = np.cumsum(length)
-    gathered = text[np.repeat(start - after + length, length) + np.arange(after[-1])]
+    gathered: U8 = text[np.repeat(start - after + length, length) + np.arange(after[-1])]
     gathered[after - 1] = 32
     return gathered
 

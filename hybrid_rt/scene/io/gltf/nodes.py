@@ -79,7 +79,7 @@ class Nodes:
         while k >= 0 and k not in self._world:
             path.append(k)
             k = self._parent[k]
-        matrix = self._world[k] if k >= 0 else np.eye(4)
+        matrix: F64 = self._world[k] if k >= 0 else np.eye(4)
         for below in reversed(path):
             matrix = matrix @ _local(self.nodes[below])
             self._world[below] = matrix
@@ -90,7 +90,7 @@ def _local(node: At) -> F64:
     given = node.get("matrix")
     parts = {key: node.get(key) for key in ("translation", "rotation", "scale")}
     if given is not None:
-        matrix = np.array(given.numbers(16)).reshape(4, 4).T
+        matrix: F64 = np.array(given.numbers(16)).reshape(4, 4).T
         if any(part is not None for part in parts.values()):
             raise node.fault("a matrix beside translation, rotation or scale")
         if (matrix[3] != (0, 0, 0, 1)).any():
