@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import warnings
 from pathlib import Path
-from typing import Any
 
 from hybrid_rt import _check
 from hybrid_rt.errors import ArgumentError, MeshFileError

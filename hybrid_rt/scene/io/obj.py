@@ -31,7 +31,7 @@ _WITHOUT_SURFACE = (b"l", b"p")
 _IGNORED = {
     b"vt", b"vn", b"vp", b"s", b"mg", b"mtllib", b"usemap", b"maplib", b"bevel", b"c_interp",
     b"d_interp", b"lod", b"shadow_obj", b"trace_obj", b"cstype", b"deg", b"bmat", b"step",
-    b"parm", b"trim", b"hole", b"scrv", b"sp", b"end", b"con", b"ctech", b"stech",
+    b"parm", b"trim", b"hole", b"scrv", b"sp", b"end", b"con", b"ctech", b"stech", b"vw",
 }  # fmt: skip
 _REFUSED = {
     b"curv": "free-form curves", b"curv2": "free-form curves", b"surf": "free-form surfaces",

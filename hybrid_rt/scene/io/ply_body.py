@@ -53,6 +53,7 @@ class _Source:
     size: Callable[[str], int]
     take: Callable[[I64, str], NDArray[Any]]
     length: Callable[[int, str], float]
+    breaks: I64 | None = None  # where each row begins, and the last ends, where lines tell
 
 
 def binary_body(
@@ -72,7 +73,7 @@ def binary_body(
 
     endian: Literal["little", "big"] = "little" if order == "<" else "big"
     source = _Source(len(data), lambda kind: int(kind[1]), take, length)
-    body, end, _ = _rows(source, begin, elements, wanted)
+    body, end = _rows(source, begin, elements, wanted)
     if data[end:].strip(b"\0 \t\r\n"):
         raise FormatError(f"{len(data) - end} bytes follow the last row that the header says")
     return body
@@ -88,15 +89,12 @@ def ascii_body(data: bytes, begin: int, elements: list[Element], wanted: frozens
     source = _Source(
         len(values), lambda _: 1, lambda at, _: values[at], lambda at, _: float(values[at])
     )
-    body, end, starts = _rows(source, 0, elements, wanted)
+    first, _ = found.of_lines()
+    if len(first) == sum(e.rows for e in elements if e.properties):
+        source.breaks = np.append(first, len(values))
+    body, end = _rows(source, 0, elements, wanted)
     if end < len(values):
         raise FormatError(f"{len(values) - end} words follow the last row that the header says")
-    first, _ = found.of_lines()
-    if len(first) == len(starts) and (first != starts).any():
-        row = int(np.argmax(first != starts)) - 1
-        head = len(data[:begin].splitlines())
-        line = head + words.line_number(found.text.tobytes(), int(found.start[first[row]]))
-        raise FormatError(f"line {line}: a row with more or fewer words than the header says")
     return body
 
 
@@ -110,33 +108,37 @@ def _number(word: bytes) -> float:
 
 def _rows(
     source: _Source, begin: int, elements: list[Element], wanted: frozenset[str]
-) -> tuple[Body, int, I64]:
-    """Return all columns, where the last row ends, and where each begins."""
+) -> tuple[Body, int]:
+    """Return all columns, and where the last row ends."""
     body: Body = {}
-    starts = []
+    row = 0
     for element in elements:
-        columns, begin, start = _element(source, begin, element, wanted)
+        columns, begin = _element(source, begin, element, row, wanted)
         body[element.name] = columns if element.rows else {}
-        starts.append(start)
-    return body, begin, np.concatenate(starts) if starts else np.empty(0, np.int64)
+        row += element.rows if element.properties else 0
+    return body, begin
 
 
 def _element(
-    source: _Source, begin: int, element: Element, wanted: frozenset[str]
-) -> tuple[dict[str, Column], int, I64]:
+    source: _Source, begin: int, element: Element, row: int, wanted: frozenset[str]
+) -> tuple[dict[str, Column], int]:
     lists = [p for p in element.properties if p.length]
     least = sum(source.size(p.length or p.type) for p in element.properties)
     if least * element.rows > source.end - begin:
         raise _truncated(element, (source.end - begin) // least)
     if least == 0:
-        return {}, begin, np.empty(0, np.int64)
+        return {}, begin
     lengths = _equal_lengths(source, begin, element, lists)
     if lengths is None:
-        lengths = _unequal_lengths(source, begin, element, lists)
+        lengths = _unequal_lengths(source, begin, element, lists, row)
     # lengths (rows, lists) fix where everything is
     widths = lengths @ np.array([source.size(p.type) for p in lists], np.int64)
     ends = begin + np.cumsum(widths + least)
     start = ends - widths - least
+    if source.breaks is not None:
+        told = source.breaks[row + 1 : row + 1 + element.rows]
+        if (ends != told).any():
+            raise _uneven(element, int(np.argmax(ends != told)))
     at, k = start.copy(), 0
     columns: dict[str, Column] = {}
     for p in element.properties:
@@ -153,7 +155,12 @@ def _element(
             columns[p.name] = Lists(count, source.take(offsets, p.type))
         at += count * size
         k += 1
-    return columns, int(ends[-1]) if len(ends) else begin, start
+    return columns, int(ends[-1]) if len(ends) else begin
+
+
+def _uneven(element: Element, row: int) -> FormatError:
+    what = "its line has more or fewer words than the header says"
+    return FormatError(f"element {element.name}, row {row}: {what}")
 
 
 def _truncated(element: Element, rows: int) -> FormatError:
@@ -196,7 +203,9 @@ def _bad_length(element: Element, row: int, length: float) -> FormatError:
     return FormatError(f"element {element.name}, row {row}: a list of length {length:g}")
 
 
-def _unequal_lengths(source: _Source, begin: int, element: Element, lists: list[Property]) -> I64:
+def _unequal_lengths(
+    source: _Source, begin: int, element: Element, lists: list[Property], first: int
+) -> I64:
     """Return the lengths of lists (rows, lists), found one row after the other."""
     # for each list: bytes before its length, size of the length, size of an item, and its type
     steps, fixed = [], 0
@@ -218,6 +227,8 @@ def _unequal_lengths(source: _Source, begin: int, element: Element, lists: list[
             found.append(int(length))
             at += head + int(length) * item
         at += fixed
+        if source.breaks is not None and at != source.breaks[first + row + 1]:
+            raise _uneven(element, row)
         if at > source.end:
             raise _truncated(element, row)
     return np.array(found, np.int64).reshape(-1, len(lists))

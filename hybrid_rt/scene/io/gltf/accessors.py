@@ -41,7 +41,7 @@ class Arrays:
         self.buffers = tree.all("buffers")
         self._bytes: dict[int, bytes] = {}
         self._decoded: dict[int, NDArray[np.uint8]] = {}
-        self._kept: dict[tuple[int, bool], NDArray[Any]] = {}
+        self._kept: dict[int, NDArray[Any]] = {}
 
     def buffer(self, k: int) -> bytes:
         """Return the bytes of a buffer."""
@@ -63,7 +63,7 @@ class Arrays:
         """Return the bytes of a buffer view, decompressed."""
         if k not in self._decoded:
             view = self.views[k]
-            packed = view.extension("EXT_meshopt_compression")
+            packed = next(filter(None, map(view.extension, codecs.MESHOPT)), None)
             if packed is None:
                 self._decoded[k] = np.frombuffer(self.part(view), np.uint8)
             else:
@@ -75,7 +75,7 @@ class Arrays:
     def floats(self, place: At, kind: str) -> F64:
         """Return an accessor (count, width) as float64, normalised where it says so."""
         k = place.index(self.accessors)
-        values = self._values(k, place, (kind,))
+        values = self._values(k, place, kind)
         accessor = self.accessors[k]
         flag = accessor.get("normalized")
         if flag is None or not flag.flag():
@@ -85,27 +85,24 @@ class Arrays:
     def integers(self, place: At, kind: str) -> I64:
         """Return an accessor of unsigned integers, (count, width)."""
         k = place.index(self.accessors)
-        component = self.accessors[k].need("componentType")
-        if component.value not in _INDEX_TYPES:
-            raise component.fault(f"expected unsigned integers, got {component.value!r}")
-        return self._values(k, place, (kind,)).astype(np.int64)
+        _check_unsigned(self.accessors[k].need("componentType"))
+        return self._values(k, place, kind).astype(np.int64)
 
     def count(self, place: At) -> int:
         """Return how many elements an accessor has."""
         return self.accessors[place.index(self.accessors)].need("count").integer(1)
 
-    def _values(self, k: int, place: At, kinds: tuple[str, ...]) -> NDArray[Any]:
+    def _values(self, k: int, place: At, wanted: str) -> NDArray[Any]:
         accessor = self.accessors[k]
         kind = accessor.need("type").text()
-        if kind not in kinds:
-            raise place.fault(f"expected an accessor of type {' or '.join(kinds)}, got {kind}")
-        key = (k, True)
-        if key not in self._kept:
-            self._kept[key] = self._read(accessor, WIDTHS[kind])
-        return self._kept[key]
+        if kind != wanted:
+            raise place.fault(f"expected an accessor of type {wanted}, got {kind}")
+        if k not in self._kept:
+            self._kept[k] = self._read(accessor, WIDTHS[kind])
+        return self._kept[k]
 
     def _read(self, accessor: At, width: int) -> NDArray[Any]:
-        dtype = _component(accessor.need("componentType"))
+        dtype = component(accessor.need("componentType"))
         count = accessor.need("count").integer(1)
         self._budget.spend(count * width * dtype.itemsize, accessor.place)
         if accessor.get("bufferView") is None:
@@ -117,10 +114,9 @@ class Arrays:
             return values
         n = sparse.need("count").integer(1)
         indices = sparse.need("indices")
-        component = indices.need("componentType")
-        if component.value not in _INDEX_TYPES:
-            raise component.fault(f"expected unsigned integers, got {component.value!r}")
-        where = self._dense(indices, indices, _component(component), n, 1)[:, 0].astype(np.int64)
+        kind = indices.need("componentType")
+        _check_unsigned(kind)
+        where = self._dense(indices, indices, component(kind), n, 1)[:, 0].astype(np.int64)
         if (where >= count).any() or (np.diff(where) <= 0).any():
             raise indices.fault(f"expected ascending indices below {count}")
         values = values.copy()
@@ -148,7 +144,13 @@ class Arrays:
         return np.ascontiguousarray(rows).view(dtype)
 
 
-def _component(place: At) -> np.dtype[Any]:
+def _check_unsigned(place: At) -> None:
+    if not isinstance(place.value, int) or place.value not in _INDEX_TYPES:
+        raise place.fault(f"expected unsigned integers, got {place.value!r}")
+
+
+def component(place: At) -> np.dtype[Any]:
+    """Return the NumPy type of a componentType."""
     if not isinstance(place.value, int) or place.value not in COMPONENTS:
         raise place.fault(f"{place.value!r} is no component type of glTF 2.0")
     return np.dtype(COMPONENTS[place.value])

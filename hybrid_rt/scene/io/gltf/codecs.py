@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from hybrid_rt.scene.io.gltf.tree import At
 
+# The second is the first under its later name.
+MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 _EXTRA = 'pip install "hybrid-rt[gltf]" reads it'
 _DRACO_HEAD = 11  # "DRACO", version, kind, method, flags: bytes
 

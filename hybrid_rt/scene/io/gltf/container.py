@@ -14,13 +14,14 @@ from hybrid_rt.scene.io.gltf.tree import At, parse
 # Extensions that a file may require: read here, or of no consequence to triangles.
 _READ = {
     "KHR_mesh_quantization", "EXT_mesh_gpu_instancing", "KHR_draco_mesh_compression",
-    "EXT_meshopt_compression", "KHR_node_visibility",
+    "EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_node_visibility",
 }  # fmt: skip
 _HARMLESS = {
     "KHR_lights_punctual", "EXT_lights_image_based", "EXT_lights_ies", "KHR_texture_transform",
     "KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds",
     "MSFT_packing_normalRoughnessMetallic", "MSFT_packing_occlusionRoughnessMetallic",
     "KHR_xmp", "KHR_xmp_json_ld", "KHR_animation_pointer", "KHR_techniques_webgl",
+    "KHR_technique_webgl",
     "KHR_node_hoverability", "KHR_node_selectability", "EXT_mesh_features",
     "EXT_structural_metadata", "EXT_mesh_manifold", "ADOBE_materials_thin_transparency",
     "GODOT_single_root", "EXT_texture_procedurals",
@@ -45,7 +46,7 @@ def open_file(path: Path, data: bytes) -> tuple[At, bytes | None]:
         if not re.fullmatch(r"2\.\d+", version.text()) or (
             key == "minVersion" and version.text() != "2.0"
         ):
-            raise version.fault(f"glTF {version.text()} cannot be read, only 2.0")
+            raise version.fault(f"glTF {version.text()!r} cannot be read, only 2.0")
     unknown = [
         name.text()
         for name in tree.all("extensionsRequired")

@@ -97,12 +97,13 @@ def _local(node: At) -> F64:
             raise given.fault("not affine: its last row is not 0 0 0 1")
         return matrix
     move, turn, size = parts.values()
-    return compose(
+    local: F64 = compose(
         np.array([[0.0, 0, 0] if move is None else move.numbers(3)]),
         np.array([[0.0, 0, 0, 1] if turn is None else turn.numbers(4)]),
         np.array([[1.0, 1, 1] if size is None else size.numbers(3)]),
         node,
     )[0]
+    return local
 
 
 def compose(move: F64, turn: F64, size: F64, place: At) -> F64:
@@ -112,7 +113,7 @@ def compose(move: F64, turn: F64, size: F64, place: At) -> F64:
     if bad.any():
         raise place.fault(f"a rotation of length {length[np.argmax(bad)]:g}, expected 1")
     x, y, z, w = (turn / length[:, None]).T
-    matrix = np.zeros((len(move), 4, 4))
+    matrix: F64 = np.zeros((len(move), 4, 4))
     matrix[:, 0, 0] = 1 - 2 * (y * y + z * z)
     matrix[:, 0, 1] = 2 * (x * y - z * w)
     matrix[:, 0, 2] = 2 * (x * z + y * w)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid_rt.scene.io.gltf.accessors import Arrays, normalised
+from hybrid_rt.scene.io.gltf.accessors import Arrays, component, normalised
 from hybrid_rt.scene.io.gltf.codecs import Draco
 from hybrid_rt.scene.io.gltf.tree import At
 from hybrid_rt.scene.io.parts import fan, strip
@@ -170,6 +170,13 @@ def _attribute(arrays: Arrays, place: At, draco: Draco | None, name: str, kind: 
     if values is None:
         return arrays.floats(place, kind)
     accessor = arrays.accessors[place.index(arrays.accessors)]
+    whole = component(accessor.need("componentType"))
+    if whole.kind in "iu" and values.dtype != whole:  # DracoPy hands out positions as floats
+        kept = values
+        with np.errstate(invalid="ignore"):
+            values = kept.astype(whole)
+        if (values != kept).any():
+            raise accessor.fault(f"the Draco data does not fit {whole}")
     flag = accessor.get("normalized")
     if flag is not None and flag.flag():
         return normalised(values, accessor)

@@ -66,7 +66,7 @@ class At:
         value = self.value
         if isinstance(value, float) and value.is_integer():
             value = int(value)
-        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value < 2**53:
             raise self.fault(f"expected an integer >= {least}, got {_shown(self.value)}")
         return value
 
