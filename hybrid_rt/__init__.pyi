@@ -10,6 +10,8 @@ from .base import register as register
 from .camera.pinhole import Camera as Camera
 from .camera.pinhole import project as project
 from .camera.pinhole import unproject as unproject
+from .compiling import Compiling as Compiling
+from .compiling import on_compile as on_compile
 from .errors import ArgumentError as ArgumentError
 from .errors import EmbreeError as EmbreeError
 from .errors import HybridRTError as HybridRTError

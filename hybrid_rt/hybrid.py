@@ -141,11 +141,11 @@ def trace_hybrid(
                 Hits(*rows)._checked("what the tracer writes", len(indices), faces)
         return hits
 
-    def merge(marched: Marched, hits: Hits, workers: int) -> None:
+    def merge(marched: Marched, hits: Hits) -> None:
         vertices, triangles, _ = screen.scene.arrays
         origin, direction = rays.arrays[:2]
         kernels.answer_hits(
-            workers, marched.resolved, origin, direction, marched.prim_id, marched.t,
+            marched.resolved, origin, direction, marched.prim_id, marched.t,
             vertices, triangles, *hits.arrays,
         )  # fmt: skip
 
@@ -196,7 +196,7 @@ def occluded_hybrid(
             into(traced, occluded, indices)
         return occluded
 
-    def merge(marched: Marched, occluded: Bool, workers: int) -> None:
+    def merge(marched: Marched, occluded: Bool) -> None:
         kernels.answer_occlusion(marched.resolved, marched.prim_id, occluded)
 
     return OcclusionResult(*_in_stages(rays, screen, True, trace, merge, threads))
@@ -212,7 +212,7 @@ def _in_stages(
     screen: Screen,
     any_hit: bool,
     trace: Callable[[Rays, I32], Answers],
-    merge: Callable[[Marched, Answers, int], None],
+    merge: Callable[[Marched, Answers], None],
     threads: int | None,
 ) -> tuple[Answers, Marched, dict[str, float]]:
     """March, trace what is left, merge; return the answers, the march, and seconds by stage.
@@ -222,13 +222,13 @@ def _in_stages(
     clock = [time.perf_counter()]
     marched = screen.technique.march(rays, screen, any_hit=any_hit, threads=threads)
     clock.append(time.perf_counter())
-    with _threads.limited(threads) as workers:
+    with _threads.limited(threads):
         indices = _unresolved(marched)
         traced = _handed_over(rays, marched, screen) if screen.technique.hands_over else rays
         clock.append(time.perf_counter())
         answers = trace(traced, indices)
         clock.append(time.perf_counter())
-        merge(marched, answers, workers)
+        merge(marched, answers)
         clock.append(time.perf_counter())
     return answers, marched, {stage: clock[k + 1] - clock[k] for k, stage in enumerate(STAGES)}
 

@@ -6,6 +6,7 @@ Properties are tried on the same examples each time; ``HYPOTHESIS_PROFILE=explor
 import os
 import signal
 
+import pytest
 from hypothesis import settings
 
 settings.register_profile("same", derandomize=True)
@@ -16,3 +17,10 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell has it ignored in what it starts in the background, and whatever a test starts would
     # inherit that. A handler of our own is not inherited: what is started stops as it should.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Count all tests on real scenes among the slow ones."""
+    for item in items:
+        if item.path.stem.endswith("real_scenes"):
+            item.add_marker(pytest.mark.slow)

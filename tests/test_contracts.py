@@ -22,6 +22,19 @@ BREACHES = {
     ),
     "library sees the bench": ("hybrid_rt/rays/hits.py", "import hybrid_rt_bench\n"),
     "kernel sees the errors": ("hybrid_rt/kernels/_queue.py", "import hybrid_rt.errors\n"),
+    "the bench has a newcomer": ("bench/hybrid_rt_bench/newcomer.py", '"""Nobody knows it."""\n'),
+    "kind sees a kind": (
+        "bench/hybrid_rt_bench/kinds/peers/tables.py",
+        "import hybrid_rt_bench.kinds.paper.published\n",
+    ),
+    "report measures": (
+        "bench/hybrid_rt_bench/report/table.py",
+        "import hybrid_rt_bench.measure.memory\n",
+    ),
+    "table measures": (
+        "bench/hybrid_rt_bench/kinds/scaling/tables.py",
+        "import hybrid_rt_bench.measure.memory\n",
+    ),
 }
 
 

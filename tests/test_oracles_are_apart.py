@@ -22,12 +22,3 @@ def imported(path):
 )
 def test_oracles_import_nothing_of_the_project(path):
     assert not {name for name in imported(path) if name.split(".")[0] in PACKAGES}
-
-
-@pytest.mark.parametrize(
-    "path", sorted((ROOT / "hybrid_rt" / "kernels").glob("*.py")), ids=lambda p: p.stem
-)
-def test_kernels_import_numba_numpy_llvmlite_and_each_other_only(path):
-    allowed = ("numba", "numpy", "llvmlite", "math", "__future__", "hybrid_rt.kernels")
-    strangers = [n for n in imported(path) if not n.startswith(allowed)]
-    assert not strangers

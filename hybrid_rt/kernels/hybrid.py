@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._faces import place_of, vertices_of
 from hybrid_rt.kernels._jit import inlined, parallel_kernel
-from hybrid_rt.kernels._queue import fetch_add
+from hybrid_rt.kernels._queue import part, take
 
 CHUNK = 4096  # rays counted together
 
@@ -22,10 +21,10 @@ def unresolved(resolved, i, end):
 
 
 @parallel_kernel
-def count_unresolved(resolved, counts):
+def count_unresolved(share, resolved, counts):
     """Count the unresolved rays of each chunk; resolved (N,) bool, counts (chunks,) int64."""
     n = resolved.shape[0]
-    for chunk in prange(counts.shape[0]):
+    for chunk in part(share, counts.shape[0]):
         count = 0
         end = min(n, (chunk + 1) * CHUNK)
         for i in range(chunk * CHUNK, end, simd.WIDTH):
@@ -34,10 +33,10 @@ def count_unresolved(resolved, counts):
 
 
 @parallel_kernel
-def list_unresolved(resolved, starts, indices):
+def list_unresolved(share, resolved, starts, indices):
     """Write which rays are unresolved, in their order; starts (chunks,) int64, indices int32."""
     n = resolved.shape[0]
-    for chunk in prange(starts.shape[0]):
+    for chunk in part(share, starts.shape[0]):
         j = starts[chunk]
         end = min(n, (chunk + 1) * CHUNK)
         for i in range(chunk * CHUNK, end, simd.WIDTH):
@@ -61,7 +60,7 @@ def longest(vectors, i, end):
 
 
 @parallel_kernel
-def hand_over(resolved, origin, direction, t_near, t_free, reach, starts):
+def hand_over(share, resolved, origin, direction, t_near, t_free, reach, starts):
     """Write where a tracer in float32 has to start on rays that are proven free up to t_free.
 
     starts (N,) float32: t_near for resolved rays, and never less than that for the others.
@@ -72,7 +71,7 @@ def hand_over(resolved, origin, direction, t_near, t_free, reach, starts):
     1.5e-5 of the scene, covers that error down to a quarter of a degree.
     """
     n = resolved.shape[0]
-    for chunk in prange((n + CHUNK - 1) // CHUNK):
+    for chunk in part(share, (n + CHUNK - 1) // CHUNK):
         end = min(n, (chunk + 1) * CHUNK)
         for i in range(chunk * CHUNK, end, simd.WIDTH):
             rest = unresolved(resolved, i, end)
@@ -133,16 +132,16 @@ def answer(
 
 
 @parallel_kernel
-def answer_occlusion(resolved, march_prim, occluded):
+def answer_occlusion(share, resolved, march_prim, occluded):
     """Write whether each ray that the march resolved meets anything; (N,) bool."""
-    for i in prange(resolved.shape[0]):
+    for i in part(share, resolved.shape[0]):
         if resolved[i]:
             occluded[i] = march_prim[i] >= 0
 
 
 @parallel_kernel
 def answer_hits(
-    workers, resolved, origin, direction, march_prim, march_t, vertices, faces,
+    share, resolved, origin, direction, march_prim, march_t, vertices, faces,
     t, prim_id, u, v, n_g,
 ):  # fmt: skip
     """Write the hit of each ray that the march resolved; the other rows are left as they are.
@@ -150,14 +149,12 @@ def answer_hits(
     Workers take chunks as they come: resolved rays lie together.
     """
     n = resolved.shape[0]
-    taken = np.zeros(1, np.int64)
-    for _worker in prange(workers):
-        first = fetch_add(taken.ctypes.data, CHUNK)
-        while first < n:
-            last = min(n, first + CHUNK)
-            answer(
-                resolved[first:last], origin[first:last], direction[first:last],
-                march_prim[first:last], march_t[first:last], vertices, faces,
-                t[first:last], prim_id[first:last], u[first:last], v[first:last], n_g[first:last],
-            )  # fmt: skip
-            first = fetch_add(taken.ctypes.data, CHUNK)
+    first = take(share, CHUNK)
+    while first < n:
+        last = min(n, first + CHUNK)
+        answer(
+            resolved[first:last], origin[first:last], direction[first:last],
+            march_prim[first:last], march_t[first:last], vertices, faces,
+            t[first:last], prim_id[first:last], u[first:last], v[first:last], n_g[first:last],
+        )  # fmt: skip
+        first = take(share, CHUNK)

@@ -92,7 +92,7 @@ def primitive_lists(
     boxes = np.empty(len(vertices), np.int64)
     flags = np.empty(len(vertices), np.uint8)
     nearest_of = np.empty(len(vertices), np.float32)
-    with _threads.limited(threads) as workers:
+    with _threads.limited(threads):
         bin_kernels.box_vertices(
             vertices.reshape(-1),
             eye,
@@ -116,7 +116,7 @@ def primitive_lists(
             n_survivors = np.empty(chunks, np.int32)
             counts = np.empty((chunks, tiles), np.int32)
             bin_kernels.cull_and_count(
-                faces, first, last, corners, flags, nearest_of, width, height, tiles_x, workers,
+                faces, first, last, corners, flags, nearest_of, width, height, tiles_x,
                 chunk, records, n_survivors, counts,
             )  # fmt: skip
             entries = int(counts.sum(dtype=np.int64))
@@ -126,10 +126,10 @@ def primitive_lists(
             tile_start = np.empty(tiles + 1, np.int32)
             prefix_sums(n_survivors, counts, np.empty(chunks + 1, np.int32), tile_start)
             bins = np.empty(entries, np.int64)
-            bin_kernels.fill_bins(records, n_survivors, tiles_x, workers, chunk, counts, bins)
+            bin_kernels.fill_bins(records, n_survivors, tiles_x, chunk, counts, bins)
             kernels.fill_lists(
                 scene.corners.reshape(-1), tile_start, bins, records, eye, m, frame, near, width,
-                height, margin, tiles_x, workers, first == 0, prim_id, nearest, rest,
+                height, margin, tiles_x, first == 0, prim_id, nearest, rest,
                 planes.reshape(-1),
             )  # fmt: skip
             first = last

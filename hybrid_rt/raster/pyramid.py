@@ -130,6 +130,7 @@ def pyramid_of(depth: F32, threads: int | None) -> DepthPyramid:
     data = np.empty(cells, np.float32)
     with _threads.limited(threads):
         kernels.build(depth, *levels, data)
+        kernels.finish(*levels, data)
     return DepthPyramid._made(Cells(data), width=width, height=height)
 
 

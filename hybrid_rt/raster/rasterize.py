@@ -86,8 +86,8 @@ def rasterize(
     _check.instance("camera", camera, Camera)
     _check.choice("derivatives", derivatives, ("plane", "quad"))
     images = _images(camera.height, camera.width)
-    with _threads.limited(threads) as workers:
-        timings = _draw(scene, camera, workers, images)
+    with _threads.limited(threads):
+        timings = _draw(scene, camera, images)
         if derivatives == "quad":
             kernels.quad_differences(images.depth, images.ddx, images.ddy)
     return GBuffer._made(images, scene=scene, camera=camera, timings=timings)
@@ -107,7 +107,7 @@ def _in_lines(n: int) -> I32:
     return raw[start : start + n]
 
 
-def _draw(scene: Scene, camera: Camera, workers: int, images: GBufferArrays) -> dict[str, float]:
+def _draw(scene: Scene, camera: Camera, images: GBufferArrays) -> dict[str, float]:
     """Draw all faces over the images, a batch at a time; return the seconds of every stage."""
     timings = dict.fromkeys(("vertices", "cull", "records", "tiles"), 0.0)
     last_time = time.perf_counter()
@@ -140,7 +140,7 @@ def _draw(scene: Scene, camera: Camera, workers: int, images: GBufferArrays) -> 
         counts = np.empty((chunks, tiles), np.int32)
         cull_and_count(
             vertices, faces, first, last, eye, m, width, height, near, xy, tiles_x,
-            workers, chunk, survivors, n_survivors, n_records, counts,
+            chunk, survivors, n_survivors, n_records, counts,
         )  # fmt: skip
         entries = int(counts.sum(dtype=np.int64))
         done("cull")
@@ -154,11 +154,11 @@ def _draw(scene: Scene, camera: Camera, workers: int, images: GBufferArrays) -> 
         bins = np.empty(entries, np.int64)
         fill_bins(
             vertices, faces, eye, m, frame, width, height, near, xy, tiles_x,
-            workers, survivors, n_survivors, record_start, counts, records, bins,
+            survivors, n_survivors, record_start, counts, records, bins,
         )  # fmt: skip
         done("records")
         kernels.draw_tiles(
-            tile_start, bins, records, tiles_x, 0.5 * width, 0.5 * height, workers,
+            tile_start, bins, records, tiles_x, 0.5 * width, 0.5 * height,
             first == 0, *images,
         )  # fmt: skip
         done("tiles")

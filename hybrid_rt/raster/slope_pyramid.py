@@ -74,5 +74,7 @@ def build_slope_pyramid(gbuffer: GBuffer, *, threads: int | None = None) -> Slop
     cells, levels = layout(width, height)
     data = np.empty((cells, 3), np.float32)
     with _threads.limited(threads):
-        kernels.build(*gbuffer.arrays[:3], *levels, data)
+        kernels.copy(*gbuffer.arrays[:3], *levels[:2], data)
+        for level in range(1, len(levels[0])):
+            kernels.bound(level, *levels, data)
     return SlopePyramid._made(Cells(data), width=width, height=height)

@@ -236,7 +236,6 @@ def _in_lanes(
     with _threads.limited(threads) as workers:
         counted = np.zeros((workers, slots.COUNTERS), np.int64)
         lanes.march(
-            workers,
             (origin.reshape(-1), direction.reshape(-1), t_near, t_far),
             (width, height),
             tuple(_box(scene, camera)),
@@ -273,7 +272,7 @@ def _one_by_one(
         steps_by_level = np.zeros((workers, len(data.pyramid)), np.int64)
         tests = np.zeros((workers, 1), np.int64)
         scalar.march(
-            workers, rays.arrays, _box(scene, camera), data.lists.arrays,
+            rays.arrays, _box(scene, camera), data.lists.arrays,
             pyramid._replace(offsets=pyramid.offsets[:levels]), scene.arrays, limits,
             marched.arrays, steps_by_level, tests,
         )  # fmt: skip

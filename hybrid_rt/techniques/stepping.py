@@ -93,7 +93,7 @@ def march(
     with _threads.limited(threads) as workers:
         steps_by_level = np.zeros((workers, levels), np.int64)
         driver.march(
-            workers, rays.arrays, screen.camera.arrays, screen.gbuffer.arrays, pyramid, numbers,
+            rays.arrays, screen.camera.arrays, screen.gbuffer.arrays, pyramid, numbers,
             marched.arrays, steps_by_level,
         )  # fmt: skip
     return replace(marched, steps_by_level=steps_by_level.sum(axis=0))

@@ -16,7 +16,7 @@ from hybrid_rt.rays.hits import Hits
 from hybrid_rt.rays.rays import Rays
 from hybrid_rt.scene.mesh import Scene
 from hybrid_rt.trace.embreex import EmbreexScene
-from hybrid_rt.trace.native import QUALITIES, WIDTHS, NativeScene
+from hybrid_rt.trace.native import QUALITIES, WIDTHS, NativeScene, Way
 from hybrid_rt.trace.rows import checked_rays, checked_some, rows_at, writable_hits
 
 PATHS = ("packet", "run")
@@ -145,6 +145,10 @@ class EmbreeTracer:
         self._bvh.build(self._path)
 
     @property
+    def _way(self) -> Way:
+        return Way(self._width, self._coherent, self._order == "direction")
+
+    @property
     def path(self) -> str:
         """How Embree is called: "packet" or "run"."""
         return self._path
@@ -263,22 +267,16 @@ class EmbreeTracer:
             rows = rows_at(indices)
             hits.put(rows, self._bvh.embreex.intersect(rays.take(rows), self.threads))
             return
-        with _threads.limited(self.threads) as workers:
-            self._bvh.native.intersect(
-                rays, hits, indices, width=self._width, coherent=self._coherent,
-                by_direction=self._order == "direction", workers=workers,
-            )  # fmt: skip
+        with _threads.limited(self.threads):
+            self._bvh.native.intersect(rays, hits, indices, self._way)
 
     def _occluded(self, rays: Rays, hit: Bool, indices: I32 | None) -> None:
         if self._path == "run":
             rows = rows_at(indices)
             hit[rows] = self._bvh.embreex.occluded(rays.take(rows), self.threads)
             return
-        with _threads.limited(self.threads) as workers:
-            self._bvh.native.occluded(
-                rays, hit, indices, width=self._width, coherent=self._coherent,
-                by_direction=self._order == "direction", workers=workers,
-            )  # fmt: skip
+        with _threads.limited(self.threads):
+            self._bvh.native.occluded(rays, hit, indices, self._way)
 
 
 class _Bvh:

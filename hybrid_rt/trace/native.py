@@ -13,6 +13,9 @@ import re
 import subprocess
 import sys
 import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -109,6 +112,15 @@ def embree_info() -> dict[str, str]:
     }
 
 
+@dataclass(frozen=True)
+class Way:
+    """How Embree is called: rays in a packet, the coherent flag, packets sorted by direction."""
+
+    width: int
+    coherent: bool
+    by_direction: bool
+
+
 class NativeScene:
     """A scene in Embree whose packet calls are reached from compiled loops.
 
@@ -158,48 +170,25 @@ class NativeScene:
         lib.rtcCommitScene(handle)
         self._check("rtcCommitScene")
 
-    def intersect(
-        self,
-        rays: Rays,
-        hits: Hits,
-        indices: I32 | None,
-        *,
-        width: int,
-        coherent: bool,
-        by_direction: bool,
-        workers: int,
-    ) -> None:
-        """Write the nearest hits of the rays at `indices`, or of all, into their rows of `hits`.
+    def intersect(self, rays: Rays, hits: Hits, indices: I32 | None, way: Way) -> None:
+        """Write the nearest hits of the rays at `indices`, or of all, into their rows of `hits`."""
+        with self._asking("rtcIntersect", indices, way) as query:
+            kernels.intersect(query, rays.arrays, hits.arrays)
 
-        `workers` is the number of Numba threads in use.
-        """
-        arguments = _query_arguments(coherent)
-        kernels.intersect(
-            _address(f"rtcIntersect{width}"), self._scene, arguments.ctypes.data, width, workers,
-            indices is not None, _NO_INDICES if indices is None else indices, by_direction,
-            *_without_pixel(rays), *hits.arrays,
-        )  # fmt: skip
-        self._check(f"rtcIntersect{width}")
-
-    def occluded(
-        self,
-        rays: Rays,
-        hit: Bool,
-        indices: I32 | None,
-        *,
-        width: int,
-        coherent: bool,
-        by_direction: bool,
-        workers: int,
-    ) -> None:
+    def occluded(self, rays: Rays, hit: Bool, indices: I32 | None, way: Way) -> None:
         """Write whether rays hit anything; as `intersect`."""
-        arguments = _query_arguments(coherent)
-        kernels.occluded(
-            _address(f"rtcOccluded{width}"), self._scene, arguments.ctypes.data, width, workers,
-            indices is not None, _NO_INDICES if indices is None else indices, by_direction,
-            *_without_pixel(rays), hit,
+        with self._asking("rtcOccluded", indices, way) as query:
+            kernels.occluded(query, rays.arrays, hit)
+
+    @contextmanager
+    def _asking(self, call: str, indices: I32 | None, way: Way) -> Iterator[kernels.Query]:
+        """Yield what a kernel asks Embree for, and raise the error that came of it."""
+        arguments = _query_arguments(way.coherent)
+        yield kernels.Query(
+            _address(f"{call}{way.width}"), self._scene, arguments.ctypes.data, way.width,
+            indices is not None, _NO_INDICES if indices is None else indices, way.by_direction,
         )  # fmt: skip
-        self._check(f"rtcOccluded{width}")
+        self._check(f"{call}{way.width}")
 
     def _check(self, call: str) -> None:
         _check_device(_library(), self._device, call)
@@ -208,14 +197,9 @@ class NativeScene:
 def usable(rays: Rays) -> tuple[Bool, F32]:
     """Return which rays may be given to Embree, and the factors that their directions need."""
     valid, scale = np.empty(len(rays), np.bool_), np.empty(len(rays), np.float32)
-    kernels.usable(*_without_pixel(rays), valid, scale)
+    origin, direction, _, t_near, t_far = rays.arrays
+    kernels.usable(origin, direction, t_near, t_far, valid, scale)
     return valid, scale
-
-
-def _without_pixel(rays: Rays) -> tuple[F32, F32, F32, F32]:
-    """Return what a tracer reads of rays."""
-    arrays = rays.arrays
-    return arrays.origin, arrays.direction, arrays.t_near, arrays.t_far
 
 
 def _release(lib: ctypes.CDLL, device: int, scene: int, buffers: tuple[F32, ...]) -> None:

@@ -77,7 +77,8 @@ def test_a_ray_that_projects_to_a_point_is_judged_by_depth():
 
 def test_a_pixel_vouches_for_its_answer_within_a_pixel():
     case = small_case([(3.3, -0.4, -1)])
-    case.rays.origin[:] = (-3, 0, -3)
+    rays = dataclasses.replace(case.rays, origin=np.full_like(case.rays.origin, (-3, 0, -3)))
+    case = dataclasses.replace(case, rays=rays)
     np.testing.assert_array_equal(case.truth.prim_id, [0])
     x, y = np.floor(hrt.project(case.camera, [(0.3, -0.4, -4)])[0, :2]).astype(int)
     # The point at t = 1.2 lies five pixels aside.

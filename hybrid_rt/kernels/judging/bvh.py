@@ -7,9 +7,9 @@ and a box is made of minima and maxima only, so every box is exact.
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
-from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+from hybrid_rt.kernels._jit import called, inlined, kernel, parallel_kernel
+from hybrid_rt.kernels._queue import part
 
 BINS = 16
 LEAF = 4
@@ -19,9 +19,9 @@ STACK = DEEPEST + 36
 
 
 @parallel_kernel
-def corners(vertices, faces, ids, low, high):
+def corners(share, vertices, faces, ids, low, high):
     """Boxes `low`, `high` (n, 3) of the triangles `ids` (n,)."""
-    for i in prange(len(ids)):
+    for i in part(share, len(ids)):
         for k in range(3):
             a = vertices[faces[ids[i], 0], k]
             b = vertices[faces[ids[i], 1], k]
@@ -65,7 +65,7 @@ def _half_area(box, row):
     return x * y + y * z + z * x
 
 
-@kernel
+@called
 def _widest(low, high, order, begin, end):
     """Return (axis, start, extent) along which the centres are spread most."""
     axis, start, extent = 0, 0.0, -1.0
@@ -79,7 +79,7 @@ def _widest(low, high, order, begin, end):
     return axis, start, extent
 
 
-@kernel
+@called
 def _split(low, high, order, begin, end, bins, count, price):
     """Reorder `order[begin:end]` into two parts; return where the second starts.
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import prange
 
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+from hybrid_rt.kernels._queue import part
 from hybrid_rt.kernels.judging.bvh import STACK
 from hybrid_rt.kernels.triangle import approach, frame, sheared
 
@@ -137,7 +137,7 @@ def _is_ray(o, d):
 
 @parallel_kernel
 def touch(
-    origin, direction, t_near, t_far, prim_id, vertices, faces, area, hit, t, error, grazed
+    share, origin, direction, t_near, t_far, prim_id, vertices, faces, area, hit, t, error, grazed
 ):  # fmt: skip
     """How each of (N, 3) rays meets the triangle `prim_id` (N,) named for it, -1 for none.
 
@@ -145,7 +145,7 @@ def touch(
     (N,) float64 and the bound `error` of its error. `grazed` (N,) float64 is the t of a graze, for
     the case that it is no hit, or NaN.
     """
-    for i in prange(len(origin)):
+    for i in part(share, len(origin)):
         hit[i], t[i], error[i], grazed[i] = NO, 0.0, 0.0, np.nan
         p = prim_id[i]
         if p < 0 or not area[p] or not _is_ray(origin[i], direction[i]):
@@ -160,9 +160,9 @@ def touch(
 
 
 @parallel_kernel
-def reach(origin, direction, prim_id, vertices, faces, out):
+def reach(share, origin, direction, prim_id, vertices, faces, out):
     """How far apart in t a ray and the named triangle may be to graze: (N,) float64, 0 for none."""
-    for i in prange(len(origin)):
+    for i in part(share, len(origin)):
         p = prim_id[i]
         out[i] = 0.0
         if p >= 0 and _is_ray(origin[i], direction[i]):
@@ -301,7 +301,7 @@ def _walk(o, d, near, far, vertices, faces, largest, order, box, link, met, met_
 
 @parallel_kernel
 def nearest(
-    origin, direction, t_near, t_far, vertices, faces, largest, order, box, link,
+    share, origin, direction, t_near, t_far, vertices, faces, largest, order, box, link,
     prim_id, t, error, grazed, sure,
 ):  # fmt: skip
     """Nearest hits of (N, 3) rays, by a tree as `kernels.bvh.build` makes it.
@@ -310,7 +310,7 @@ def nearest(
     -1 for none; `t`, the bound `error` of its error and `grazed`, the nearest graze before t or
     infinity, (N,) float64; `sure` (N,) uint8 is UNSURE where exact arithmetic has to look.
     """
-    for i in prange(len(origin)):
+    for i in part(share, len(origin)):
         prim_id[i], t[i], error[i], grazed[i], sure[i] = -1, np.inf, 0.0, np.inf, YES
         if _is_ray(origin[i], direction[i]):
             nothing, no_graze = np.empty(0, np.int32), np.empty(0)
@@ -332,9 +332,9 @@ def gather(
 
 
 @parallel_kernel
-def area(vertices, faces, kind):
+def area(share, vertices, faces, kind):
     """Write to `kind` (F,) uint8 whether each triangle has an area: YES or UNSURE."""
-    for i in prange(len(faces)):
+    for i in part(share, len(faces)):
         ux, uy, uz = _minus(vertices, faces[i, 1], vertices[faces[i, 0]])
         vx, vy, vz = _minus(vertices, faces[i, 2], vertices[faces[i, 0]])
         x, ex = _triple(1.0, 0.0, 0.0, ux, uy, uz, vx, vy, vz)

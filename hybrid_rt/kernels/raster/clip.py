@@ -8,10 +8,10 @@ coordinates are snapped to 1/256 pixel. The guard band bounds them, so that ever
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
 from hybrid_rt.kernels import simd
-from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+from hybrid_rt.kernels._jit import called, inlined, parallel_kernel
+from hybrid_rt.kernels._queue import part
 
 SUBPIXEL_BITS = 8
 ONE = 1 << SUBPIXEL_BITS
@@ -49,7 +49,7 @@ def snap(x):
 
 
 @parallel_kernel
-def transform_vertices(vertices, eye, m, width, height, near, xy):
+def transform_vertices(share, vertices, eye, m, width, height, near, xy):
     """Snap all vertices: (V, 3) float32 world -> xy (V,) int64, y above x.
 
     A vertex nearer than the near plane or beyond the guard band has `CLIPPED` for x and, for y,
@@ -57,7 +57,7 @@ def transform_vertices(vertices, eye, m, width, height, near, xy):
     """
     n = len(vertices)
     w, h = np.float64(width), np.float64(height)
-    for group in prange((n + LANES - 1) // LANES):
+    for group in part(share, (n + LANES - 1) // LANES):
         at = group * LANES
         live = simd.first(n - at, LANES)
         px, py, pz = simd.load_triples(vertices, 3 * at, n - at, LANES)
@@ -100,7 +100,7 @@ def _before(q, a, b):
     return q[a, 2] < q[b, 2]
 
 
-@kernel
+@called
 def clip_plane(plane, near, q, n, result):
     """Clip the convex polygon q[:n] against one plane into `result`; return its corner count.
 
@@ -137,7 +137,7 @@ def _doubled_area(p, a, b, c):
     ) * np.int64(p[c, 0] - p[a, 0])
 
 
-@kernel
+@called
 def clip_triangle(vertices, faces, face, eye, m, near, q, spare, corners):
     """Clip one triangle; return how many corners its snapped polygon has.
 

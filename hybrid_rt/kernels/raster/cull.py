@@ -5,17 +5,17 @@ with the top-left rule: two triangles at a shared edge never both cover a centre
 out.
 
 Triangles go through in batches of consecutive faces, a batch in chunks, a chunk on one thread,
-LANES faces at a time. Each of `workers` threads takes chunks in turn (k, k + workers ...), which
+LANES faces at a time. Threads take chunks as they come, which
 spreads the visible part of a scene evenly.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
 from hybrid_rt.kernels import simd
-from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+from hybrid_rt.kernels._jit import called, inlined, parallel_kernel
+from hybrid_rt.kernels._queue import take
 from hybrid_rt.kernels.raster.bins import TILE_BITS, put, put_in_tiles
 from hybrid_rt.kernels.raster.clip import (
     CLIPPED,
@@ -191,7 +191,7 @@ def new_clip_scratch():
     )
 
 
-@kernel
+@called
 def clipped_pieces(vertices, faces, face, eye, m, near, width, height, scratch, pieces):
     """Clip a face and cut it into triangles that may cover a pixel; return how many.
 
@@ -230,8 +230,8 @@ def clipped_pieces(vertices, faces, face, eye, m, near, width, height, scratch, 
 
 @parallel_kernel
 def cull_and_count(
-    vertices, faces, first, last, eye, m, width, height, near, xy, tiles_x,
-    workers, chunk, survivors, n_survivors, n_records, counts,
+    share, vertices, faces, first, last, eye, m, width, height, near, xy, tiles_x,
+    chunk, survivors, n_survivors, n_records, counts,
 ):  # fmt: skip
     """Find the faces first..last-1 that may cover a pixel, and how many records each tile gets.
 
@@ -240,64 +240,65 @@ def cull_and_count(
     which ~face is a face to be clipped; n_survivors, n_records (chunks,) int32 and counts (chunks,
     tiles) int32.
     """
-    for worker in prange(workers):
-        scratch = new_scratch()
-        clip_scratch = new_clip_scratch()
-        pieces = np.empty((PIECES, 7), np.int64)
-        for c in range(worker, len(counts), workers):
-            count = counts[c]
-            count[:] = 0
-            begin = first + c * chunk
-            end = min(begin + chunk, last)
-            kept = survivors[c]
-            n_kept = 0
-            records = 0
-            for at in range(begin, end, LANES):
-                live = simd.first(end - at, LANES)
-                v0, v1, v2 = simd.load_triples(faces, 3 * at, end - at, LANES)
-                p, q, r = corners_of(v0, v1, v2, live, xy)
-                clip = simd.to_i32(p) == CLIPPED
-                clip = clip | (simd.to_i32(q) == CLIPPED) | (simd.to_i32(r) == CLIPPED)
-                clip = clip & live
-                box = box_of(p, q, r, width, height)
-                i0, j0, i1, j1 = box
-                some = live & ~clip & (i0 <= i1) & (j0 <= j1)
-                if not simd.any_(some | clip):
+    scratch = new_scratch()
+    clip_scratch = new_clip_scratch()
+    pieces = np.empty((PIECES, 7), np.int64)
+    c = take(share, 1)
+    while c < len(counts):
+        count = counts[c]
+        count[:] = 0
+        begin = first + c * chunk
+        end = min(begin + chunk, last)
+        kept = survivors[c]
+        n_kept = 0
+        records = 0
+        for at in range(begin, end, LANES):
+            live = simd.first(end - at, LANES)
+            v0, v1, v2 = simd.load_triples(faces, 3 * at, end - at, LANES)
+            p, q, r = corners_of(v0, v1, v2, live, xy)
+            clip = simd.to_i32(p) == CLIPPED
+            clip = clip | (simd.to_i32(q) == CLIPPED) | (simd.to_i32(r) == CLIPPED)
+            clip = clip & live
+            box = box_of(p, q, r, width, height)
+            i0, j0, i1, j1 = box
+            some = live & ~clip & (i0 <= i1) & (j0 <= j1)
+            if not simd.any_(some | clip):
+                continue
+            p, q, r, inside = turned(p, q, r)
+            some = some & inside
+            small = some & (i1 - i0 <= 1) & (j1 - j0 <= 1)
+            if simd.any_(small):
+                some = some & (~small | covers_any(p, q, r, box))
+            put_lanes(some, p, q, r, box, tiles_x, None, scratch, count, None)
+            records += simd.count(some)
+            cut = 0
+            left = simd.bits(clip)
+            while left != 0:
+                k = simd.lowest(left)
+                left &= left - 1
+                face = at + k
+                if (
+                    beside(xy[faces[face, 0]], width, height)
+                    & beside(xy[faces[face, 1]], width, height)
+                    & beside(xy[faces[face, 2]], width, height)
+                ) != 0:
                     continue
-                p, q, r, inside = turned(p, q, r)
-                some = some & inside
-                small = some & (i1 - i0 <= 1) & (j1 - j0 <= 1)
-                if simd.any_(small):
-                    some = some & (~small | covers_any(p, q, r, box))
-                put_lanes(some, p, q, r, box, tiles_x, None, scratch, count, None)
-                records += simd.count(some)
-                cut = 0
-                left = simd.bits(clip)
-                while left != 0:
-                    k = simd.lowest(left)
-                    left &= left - 1
-                    face = at + k
-                    if (
-                        beside(xy[faces[face, 0]], width, height)
-                        & beside(xy[faces[face, 1]], width, height)
-                        & beside(xy[faces[face, 2]], width, height)
-                    ) != 0:
-                        continue
-                    found = clipped_pieces(
-                        vertices, faces, face, eye, m, near, width, height, clip_scratch, pieces
+                found = clipped_pieces(
+                    vertices, faces, face, eye, m, near, width, height, clip_scratch, pieces
+                )
+                for n in range(found):
+                    a = pieces[n]
+                    put_in_tiles(
+                        a[0], a[1], a[2], (a[3], a[4], a[5], a[6]), tiles_x, None, count, None
                     )
-                    for n in range(found):
-                        a = pieces[n]
-                        put_in_tiles(
-                            a[0], a[1], a[2], (a[3], a[4], a[5], a[6]), tiles_x, None, count, None
-                        )
-                    if found > 0:
-                        cut |= 1 << k
-                        records += found
-                clip = simd.mask_of_bits(cut, LANES)
-                some = some | clip
-                face = simd.iota(LANES) + at
-                simd.store(kept, n_kept, simd.compress(simd.select(clip, ~face, face), some))
-                n_kept += simd.count(some)
-            n_survivors[c] = n_kept
-            n_records[c] = records
+                if found > 0:
+                    cut |= 1 << k
+                    records += found
+            clip = simd.mask_of_bits(cut, LANES)
+            some = some | clip
+            face = simd.iota(LANES) + at
+            simd.store(kept, n_kept, simd.compress(simd.select(clip, ~face, face), some))
+            n_kept += simd.count(some)
+        n_survivors[c] = n_kept
+        n_records[c] = records
+        c = take(share, 1)

@@ -16,13 +16,12 @@ its pixels have already left out of their lists changes nothing.
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._aligned import aligned
 from hybrid_rt.kernels._borrow import borrowed, keep
 from hybrid_rt.kernels._jit import inlined, parallel_kernel
-from hybrid_rt.kernels._queue import fetch_add
+from hybrid_rt.kernels._queue import take
 from hybrid_rt.kernels._rows import transposed
 from hybrid_rt.kernels.raster._order import BUCKETS, near_first
 from hybrid_rt.kernels.raster.bins import TILE, TILE_BITS
@@ -222,8 +221,8 @@ def write_tile(left, top, right, bottom, keys, words, floats, filled, prim_id, n
 
 @parallel_kernel
 def fill_lists(
-    corners, tile_start, bins, records, eye, m, frame, near, width, height, margin, tiles_x,
-    workers, fresh, prim_id, nearest, rest, planes,
+    share, corners, tile_start, bins, records, eye, m, frame, near, width, height, margin, tiles_x,
+    fresh, prim_id, nearest, rest, planes,
 ):  # fmt: skip
     """Insert every bin's faces into the lists of its tile.
 
@@ -237,72 +236,70 @@ def fill_lists(
     most = 0
     for tile in range(tiles):
         most = max(most, tile_start[tile + 1] - tile_start[tile])
-    taken = np.zeros(1, np.int64)
-    for _ in prange(workers):
-        owner = aligned(BLOCKS * (length + 1) * LANES)
-        keys = borrowed(owner)
-        words, floats = keys.view(np.int32), keys.view(np.float32)
-        rows = aligned(ROWS * LANES).view(np.float64)
-        starts = aligned(4 * LANES).view(np.float64)
-        places = aligned(LANES).view(np.int32)
-        chosen, spans = np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
-        near_bits = np.zeros(LANES, np.int32)
-        nears = near_bits.view(np.float32)
-        owner2 = aligned(BLOCKS // 2).view(np.int32)
-        farthest = borrowed(owner2)
-        owner3 = np.empty(BLOCKS, np.int64)
-        filled = borrowed(owner3)
-        order = np.empty(most, np.int64)
-        heads = np.empty(BUCKETS + 1, np.int32)
-        tile = fetch_add(taken.ctypes.data, 1)
-        while tile < tiles:
-            start, end = np.int64(tile_start[tile]), np.int64(tile_start[tile + 1])
-            if fresh or end > start:
-                left = (tile % tiles_x) << TILE_BITS
-                top = (tile // tiles_x) << TILE_BITS
-                right = min(left + TILE, width)
-                bottom = min(top + TILE, height)
-                farthest[:] = 0
-                if fresh:
-                    filled[:] = 0
-                else:
-                    filled[:] = length + 1
-                    read_tile(left, top, right, bottom, prim_id, nearest, rest, words, floats)
-                near_first(bins, start, end, order, heads)
-                at = np.int64(0)
-                while at < end - start:
-                    count = 0
-                    while count < LANES and at < end - start:
-                        s = order[at] & 0xFFFFFFFF
-                        at += 1
-                        span, word = records[s, 0], records[s, 1]
-                        i0, j0, i1, j1 = within(span, left, top, right, bottom)
-                        if word >> 32 < hidden(left, top, i0, j0, i1, j1, farthest):
-                            continue
-                        chosen[count], spans[count] = word & 0xFFFFFFFF, span
-                        near_bits[count] = word >> 32
-                        count += 1
-                    if count == 0:
-                        break
-                    for lane in range(count, LANES):
-                        chosen[lane], spans[lane] = chosen[0], spans[0]
-                    some = set_up(
-                        corners, chosen, spans, left, top, right, bottom, eye, m, frame, near,
-                        width, height, margin, cx, cy, rows, planes,
+    owner = aligned(BLOCKS * (length + 1) * LANES)
+    keys = borrowed(owner)
+    words, floats = keys.view(np.int32), keys.view(np.float32)
+    rows = aligned(ROWS * LANES).view(np.float64)
+    starts = aligned(4 * LANES).view(np.float64)
+    places = aligned(LANES).view(np.int32)
+    chosen, spans = np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
+    near_bits = np.zeros(LANES, np.int32)
+    nears = near_bits.view(np.float32)
+    owner2 = aligned(BLOCKS // 2).view(np.int32)
+    farthest = borrowed(owner2)
+    owner3 = np.empty(BLOCKS, np.int64)
+    filled = borrowed(owner3)
+    order = np.empty(most, np.int64)
+    heads = np.empty(BUCKETS + 1, np.int32)
+    tile = take(share, 1)
+    while tile < tiles:
+        start, end = np.int64(tile_start[tile]), np.int64(tile_start[tile + 1])
+        if fresh or end > start:
+            left = (tile % tiles_x) << TILE_BITS
+            top = (tile // tiles_x) << TILE_BITS
+            right = min(left + TILE, width)
+            bottom = min(top + TILE, height)
+            farthest[:] = 0
+            if fresh:
+                filled[:] = 0
+            else:
+                filled[:] = length + 1
+                read_tile(left, top, right, bottom, prim_id, nearest, rest, words, floats)
+            near_first(bins, start, end, order, heads)
+            at = np.int64(0)
+            while at < end - start:
+                count = 0
+                while count < LANES and at < end - start:
+                    s = order[at] & 0xFFFFFFFF
+                    at += 1
+                    span, word = records[s, 0], records[s, 1]
+                    i0, j0, i1, j1 = within(span, left, top, right, bottom)
+                    if word >> 32 < hidden(left, top, i0, j0, i1, j1, farthest):
+                        continue
+                    chosen[count], spans[count] = word & 0xFFFFFFFF, span
+                    near_bits[count] = word >> 32
+                    count += 1
+                if count == 0:
+                    break
+                for lane in range(count, LANES):
+                    chosen[lane], spans[lane] = chosen[0], spans[0]
+                some = set_up(
+                    corners, chosen, spans, left, top, right, bottom, eye, m, frame, near,
+                    width, height, margin, cx, cy, rows, planes,
+                )  # fmt: skip
+                some &= (np.int64(1) << count) - 1
+                while some != 0:
+                    lane = simd.lowest(some)
+                    some &= some - 1
+                    i0, j0, i1, j1 = within(spans[lane], left, top, right, bottom)
+                    draw(
+                        chosen[lane], nears[lane], lane, rows, left, top, i0, j0, i1, j1,
+                        cx, cy, length, keys, filled, farthest, places, starts,
                     )  # fmt: skip
-                    some &= (np.int64(1) << count) - 1
-                    while some != 0:
-                        lane = simd.lowest(some)
-                        some &= some - 1
-                        i0, j0, i1, j1 = within(spans[lane], left, top, right, bottom)
-                        draw(
-                            chosen[lane], nears[lane], lane, rows, left, top, i0, j0, i1, j1,
-                            cx, cy, length, keys, filled, farthest, places, starts,
-                        )  # fmt: skip
-                write_tile(
-                    left, top, right, bottom, keys, words, floats, filled, prim_id, nearest, rest
-                )
-            tile = fetch_add(taken.ctypes.data, 1)
-        keep(owner)
-        keep(owner2)
-        keep(owner3)
+            write_tile(
+                left, top, right, bottom, keys, words, floats, filled, prim_id, nearest, rest
+            )
+        tile = take(share, 1)
+    keep(owner)
+    keep(owner2)
+    keep(owner3)

@@ -8,11 +8,10 @@ a triangle wholly in front of the near plane is the least that holds those of it
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._jit import inlined, parallel_kernel
-from hybrid_rt.kernels._queue import fetch_add
+from hybrid_rt.kernels._queue import part, take
 from hybrid_rt.kernels.raster._order import entry
 from hybrid_rt.kernels.raster.bins import TILE_BITS
 
@@ -55,7 +54,7 @@ def round_up(depth):
 
 
 @parallel_kernel
-def box_vertices(vertices, eye, m, near, width, height, margin, boxes, flags, nearest):
+def box_vertices(share, vertices, eye, m, near, width, height, margin, boxes, flags, nearest):
     """Find the flags and boxes of all vertices, and how near they are.
 
     vertices (3 V,) float32 world -> boxes (V,) int64, which hold i0, j0, i1, j1 as int16, the first
@@ -66,7 +65,7 @@ def box_vertices(vertices, eye, m, near, width, height, margin, boxes, flags, ne
     close = near * (1.0 - NEAR_SLACK)
     right, bottom = width - 1.0, height - 1.0
     beyond_x, beyond_y = min(width, MOST) + 0.0, min(height, MOST) + 0.0
-    for group in prange((n + LANES - 1) // LANES):
+    for group in part(share, (n + LANES - 1) // LANES):
         at = group * LANES
         live = simd.first(n - at, LANES)
         px, py, pz = simd.load_triples(vertices, 3 * at, n - at, LANES)
@@ -117,7 +116,7 @@ def face_box(a, b, c, boxes, flags, width, height):
 
 @parallel_kernel
 def cull_and_count(
-    faces, first, last, boxes, flags, nearest, width, height, tiles_x, workers, chunk,
+    share, faces, first, last, boxes, flags, nearest, width, height, tiles_x, chunk,
     records, n_survivors, counts,
 ):  # fmt: skip
     """Find the faces first..last-1 that may touch a pixel, and count them in every tile.
@@ -127,49 +126,45 @@ def cull_and_count(
     number of the face in the lower half; n_survivors (chunks,) int32; counts (chunks, tiles) int32.
     """
     depth_bits = nearest.view(np.int32)
-    taken = np.zeros(1, np.int64)
-    for _ in prange(workers):
-        c = fetch_add(taken.ctypes.data, 1)
-        while c < len(counts):
-            count = counts[c]
-            count[:] = 0
-            begin = first + c * chunk
-            kept = begin - first
-            for face in range(begin, min(begin + chunk, last)):
-                p, q, r = faces[face, 0], faces[face, 1], faces[face, 2]
-                some, i0, j0, i1, j1 = face_box(p, q, r, boxes, flags, width, height)
-                if not some:
-                    continue
-                depth = max(depth_bits[p], depth_bits[q], depth_bits[r])
-                records[kept, 0] = i0 | (j0 << 16) | (i1 << 32) | (j1 << 48)
-                records[kept, 1] = (np.int64(depth) << 32) | np.int64(face)
-                kept += 1
-                for v in range(j0 >> TILE_BITS, (j1 >> TILE_BITS) + 1):
-                    for u in range(i0 >> TILE_BITS, (i1 >> TILE_BITS) + 1):
-                        count[v * tiles_x + u] += 1
-            n_survivors[c] = kept - (begin - first)
-            c = fetch_add(taken.ctypes.data, 1)
+    c = take(share, 1)
+    while c < len(counts):
+        count = counts[c]
+        count[:] = 0
+        begin = first + c * chunk
+        kept = begin - first
+        for face in range(begin, min(begin + chunk, last)):
+            p, q, r = faces[face, 0], faces[face, 1], faces[face, 2]
+            some, i0, j0, i1, j1 = face_box(p, q, r, boxes, flags, width, height)
+            if not some:
+                continue
+            depth = max(depth_bits[p], depth_bits[q], depth_bits[r])
+            records[kept, 0] = i0 | (j0 << 16) | (i1 << 32) | (j1 << 48)
+            records[kept, 1] = (np.int64(depth) << 32) | np.int64(face)
+            kept += 1
+            for v in range(j0 >> TILE_BITS, (j1 >> TILE_BITS) + 1):
+                for u in range(i0 >> TILE_BITS, (i1 >> TILE_BITS) + 1):
+                    count[v * tiles_x + u] += 1
+        n_survivors[c] = kept - (begin - first)
+        c = take(share, 1)
 
 
 @parallel_kernel
-def fill_bins(records, n_survivors, tiles_x, workers, chunk, cursors, bins):
+def fill_bins(share, records, n_survivors, tiles_x, chunk, cursors, bins):
     """Note the survivors, by their places, in every tile of their box.
 
     cursors (chunks, tiles) int32, made of the counts by `kernels.raster.bins.prefix_sums`, are
     advanced; bins (entries,) int64, see `kernels.raster._order`.
     """
-    taken = np.zeros(1, np.int64)
-    for _ in prange(workers):
-        c = fetch_add(taken.ctypes.data, 1)
-        while c < len(cursors):
-            cursor = cursors[c]
-            for s in range(c * chunk, c * chunk + n_survivors[c]):
-                span = records[s, 0]
-                u0, u1 = (span & 0xFFFF) >> TILE_BITS, ((span >> 32) & 0xFFFF) >> TILE_BITS
-                v0, v1 = ((span >> 16) & 0xFFFF) >> TILE_BITS, span >> (48 + TILE_BITS)
-                for v in range(v0, v1 + 1):
-                    for u in range(u0, u1 + 1):
-                        tile = v * tiles_x + u
-                        bins[cursor[tile]] = entry(records[s, 1] >> 32, s)
-                        cursor[tile] += 1
-            c = fetch_add(taken.ctypes.data, 1)
+    c = take(share, 1)
+    while c < len(cursors):
+        cursor = cursors[c]
+        for s in range(c * chunk, c * chunk + n_survivors[c]):
+            span = records[s, 0]
+            u0, u1 = (span & 0xFFFF) >> TILE_BITS, ((span >> 32) & 0xFFFF) >> TILE_BITS
+            v0, v1 = ((span >> 16) & 0xFFFF) >> TILE_BITS, span >> (48 + TILE_BITS)
+            for v in range(v0, v1 + 1):
+                for u in range(u0, u1 + 1):
+                    tile = v * tiles_x + u
+                    bins[cursor[tile]] = entry(records[s, 1] >> 32, s)
+                    cursor[tile] += 1
+        c = take(share, 1)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from numba import prange
-
-from hybrid_rt.kernels._jit import kernel, parallel_kernel
+from hybrid_rt.kernels._jit import called, kernel, parallel_kernel
+from hybrid_rt.kernels._queue import part
 
 BAND_LEVELS = 4
 """Levels that one band of rows makes on its own: 16 rows of 1920 pixels fit the L2 cache."""
 
 
-@kernel
+@called
 def reduce_rows(data, source, pitch, width, height, target, wide_pitch, first, last):
     """Make rows first..last-1 of a level at `target` from the level (height, width) at `source`.
 
@@ -32,23 +31,23 @@ def reduce_rows(data, source, pitch, width, height, target, wide_pitch, first, l
 
 
 @parallel_kernel
-def build(depth, offsets, pitches, widths, heights, data):
-    """Fill data (cells,) float32 with all levels of depth (H, W) float32; level 0 is a copy.
+def build(share, depth, offsets, pitches, widths, heights, data):
+    """Fill data (cells,) float32 with the lower levels of depth (H, W) float32; level 0 is a copy.
 
     offsets, pitches, widths, heights (L,) int64. Each band of rows goes up as far as it stays whole
-    while it is in the cache; what is left above is small and is done at the end.
+    while it is in the cache; `finish` makes what is left above.
     """
     levels = len(offsets)
     low = min(BAND_LEVELS, levels - 1)
     rows = 1 << low
     height, width = depth.shape
-    for band in prange(heights[low]):
+    for band in part(share, heights[low]):
         begin = band * rows
         end = min(begin + rows, height)
         for y in range(begin, end):
             start = offsets[0] + y * pitches[0]
-            row = data[start : start + width]
-            row[:] = depth[y]
+            for x in range(width):  # an assignment of slices would compile what it raises
+                data[start + x] = depth[y, x]
         for level in range(1, low + 1):
             first = begin >> level
             last = min((band + 1) * (rows >> level), heights[level])
@@ -63,7 +62,12 @@ def build(depth, offsets, pitches, widths, heights, data):
                 first,
                 last,
             )
-    for level in range(low + 1, levels):
+
+
+@kernel
+def finish(offsets, pitches, widths, heights, data):
+    """Fill data (cells,) float32 with the levels that `build` has left, which are small."""
+    for level in range(BAND_LEVELS + 1, len(offsets)):
         reduce_rows(
             data,
             offsets[level - 1],

@@ -6,11 +6,11 @@ Records are in the order of prim_id, so that their numbers can decide ties of de
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._faces import place_of, vertices_of
 from hybrid_rt.kernels._jit import inlined, parallel_kernel
+from hybrid_rt.kernels._queue import take
 from hybrid_rt.kernels._rows import transposed
 from hybrid_rt.kernels.raster._order import entry
 from hybrid_rt.kernels.raster.bins import put_in_tiles
@@ -103,57 +103,58 @@ def write_records(record, count, face, v0, v1, v2, p, q, r, vertices, eye, frame
 
 @parallel_kernel
 def fill_bins(
-    vertices, faces, eye, m, frame, width, height, near, xy, tiles_x,
-    workers, survivors, n_survivors, record_start, cursors, records, bins,
+    share, vertices, faces, eye, m, frame, width, height, near, xy, tiles_x,
+    survivors, n_survivors, record_start, cursors, records, bins,
 ):  # fmt: skip
     """Write the records and the bins that `cull.cull_and_count` has counted.
 
     records (n * ROW,) int64; bins (entries,) int64, see `hybrid_rt.kernels.raster._order`.
     """
-    for worker in prange(workers):
-        scratch = new_scratch()
-        clip_scratch = new_clip_scratch()
-        pieces = np.empty((PIECES, 7), np.int64)
-        entries = np.empty(LANES, np.int64)
-        for c in range(worker, len(cursors), workers):
-            cursor = cursors[c]
-            record = np.int64(record_start[c])
-            kept, end = survivors[c], n_survivors[c]
-            s = 0
-            while s < end:
-                face = simd.load_masked(kept, s, simd.first(end - s, LANES), -1)
-                count = simd.lowest(~simd.bits(face >= 0))
-                if count > 0:
-                    live = simd.first(count, LANES)
-                    v0, v1, v2 = vertices_of(faces, face, live)
-                    p, q, r = corners_of(v0, v1, v2, live, xy)
-                    box = box_of(p, q, r, width, height)
-                    p, q, r, _ = turned(p, q, r)
-                    nearest = write_records(
-                        record, count, face, v0, v1, v2, p, q, r, vertices, eye, frame, near,
-                        records,
-                    )  # fmt: skip
-                    numbers = simd.to_i64(simd.iota(LANES)) + record
-                    simd.store(entries, 0, simd.to_i64(nearest) << 32 | numbers)
-                    put_lanes(live, p, q, r, box, tiles_x, entries, scratch, cursor, bins)
-                    record += count
-                    s += count
-                    continue
-                face = ~kept[s]
-                s += 1
-                found = clipped_pieces(
-                    vertices, faces, face, eye, m, near, width, height, clip_scratch, pieces
-                )
-                for n in range(found):
-                    a = pieces[n]
-                    nearest = write_records(
-                        record, 1, simd.i32(face, LANES), simd.i32(faces[face, 0], LANES),
-                        simd.i32(faces[face, 1], LANES), simd.i32(faces[face, 2], LANES),
-                        simd.i64(a[0], LANES), simd.i64(a[1], LANES), simd.i64(a[2], LANES),
-                        vertices, eye, frame, near, records,
-                    )  # fmt: skip
-                    put_in_tiles(
-                        a[0], a[1], a[2], (a[3], a[4], a[5], a[6]), tiles_x,
-                        entry(simd.extract(nearest, 0), record), cursor, bins,
-                    )  # fmt: skip
-                    record += 1
+    scratch = new_scratch()
+    clip_scratch = new_clip_scratch()
+    pieces = np.empty((PIECES, 7), np.int64)
+    entries = np.empty(LANES, np.int64)
+    c = take(share, 1)
+    while c < len(cursors):
+        cursor = cursors[c]
+        record = np.int64(record_start[c])
+        kept, end = survivors[c], n_survivors[c]
+        s = 0
+        while s < end:
+            face = simd.load_masked(kept, s, simd.first(end - s, LANES), -1)
+            count = simd.lowest(~simd.bits(face >= 0))
+            if count > 0:
+                live = simd.first(count, LANES)
+                v0, v1, v2 = vertices_of(faces, face, live)
+                p, q, r = corners_of(v0, v1, v2, live, xy)
+                box = box_of(p, q, r, width, height)
+                p, q, r, _ = turned(p, q, r)
+                nearest = write_records(
+                    record, count, face, v0, v1, v2, p, q, r, vertices, eye, frame, near,
+                    records,
+                )  # fmt: skip
+                numbers = simd.to_i64(simd.iota(LANES)) + record
+                simd.store(entries, 0, simd.to_i64(nearest) << 32 | numbers)
+                put_lanes(live, p, q, r, box, tiles_x, entries, scratch, cursor, bins)
+                record += count
+                s += count
+                continue
+            face = ~kept[s]
+            s += 1
+            found = clipped_pieces(
+                vertices, faces, face, eye, m, near, width, height, clip_scratch, pieces
+            )
+            for n in range(found):
+                a = pieces[n]
+                nearest = write_records(
+                    record, 1, simd.i32(face, LANES), simd.i32(faces[face, 0], LANES),
+                    simd.i32(faces[face, 1], LANES), simd.i32(faces[face, 2], LANES),
+                    simd.i64(a[0], LANES), simd.i64(a[1], LANES), simd.i64(a[2], LANES),
+                    vertices, eye, frame, near, records,
+                )  # fmt: skip
+                put_in_tiles(
+                    a[0], a[1], a[2], (a[3], a[4], a[5], a[6]), tiles_x,
+                    entry(simd.extract(nearest, 0), record), cursor, bins,
+                )  # fmt: skip
+                record += 1
+        c = take(share, 1)

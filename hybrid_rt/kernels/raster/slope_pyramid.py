@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import prange
 
-from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+from hybrid_rt.kernels._jit import called, inlined, parallel_kernel
+from hybrid_rt.kernels._queue import part
 
 
 @inlined
@@ -22,7 +22,7 @@ def least_offset(a, bx, by, out_x, out_y, half, slope_x, slope_y):
     return a - slope_x * out_x - slope_y * out_y + (abs(bx - slope_x) + abs(by - slope_y)) * half
 
 
-@kernel
+@called
 def bound_row(data, y, source, pitch, width, height, target, wide_pitch, wide, side):
     """Make row y of the level at `target` from the level (height, width) at `source`.
 
@@ -75,23 +75,27 @@ def rounded_up(value):
 
 
 @parallel_kernel
-def build(depth, ddx, ddy, offsets, pitches, widths, heights, data):
-    """Fill data (cells, 3) float32 with all levels of depth, ddx, ddy (H, W) float32.
+def copy(share, depth, ddx, ddy, offsets, pitches, data):
+    """Fill the first level of data (cells, 3) float32 with depth, ddx, ddy (H, W) float32.
 
-    offsets, pitches, widths, heights (L,) int64.
+    offsets, pitches (L,) int64.
     """
     height, width = depth.shape
-    for y in prange(height):
+    for y in part(share, height):
         for x in range(width):
             row = offsets[0] + y * pitches[0] + x
             seen = depth[y, x] > 0.0
             data[row, 0] = depth[y, x] if seen else -np.inf
             data[row, 1] = ddx[y, x] if seen else 0.0
             data[row, 2] = ddy[y, x] if seen else 0.0
-    for level in range(1, len(offsets)):
-        for y in prange(heights[level]):
-            bound_row(
-                data, y, offsets[level - 1], pitches[level - 1], widths[level - 1],
-                heights[level - 1], offsets[level], pitches[level], widths[level],
-                float(1 << (level - 1)),
-            )  # fmt: skip
+
+
+@parallel_kernel
+def bound(share, level, offsets, pitches, widths, heights, data):
+    """Make a level of data (cells, 3) float32 from the one below it; the others are (L,) int64."""
+    for y in part(share, heights[level]):
+        bound_row(
+            data, y, offsets[level - 1], pitches[level - 1], widths[level - 1],
+            heights[level - 1], offsets[level], pitches[level], widths[level],
+            float(1 << (level - 1)),
+        )  # fmt: skip

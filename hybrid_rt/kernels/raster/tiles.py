@@ -9,13 +9,12 @@ wrong costs more than a vector.
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._aligned import aligned
 from hybrid_rt.kernels._borrow import borrowed, keep
-from hybrid_rt.kernels._jit import inlined, parallel_kernel
-from hybrid_rt.kernels._queue import fetch_add
+from hybrid_rt.kernels._jit import inlined, inlined_by_value, parallel_kernel
+from hybrid_rt.kernels._queue import part, take
 from hybrid_rt.kernels.raster._order import BUCKETS, near_first
 from hybrid_rt.kernels.raster.bins import TILE, TILE_BITS
 from hybrid_rt.kernels.raster.clip import HALF, ONE, SUBPIXEL_BITS
@@ -159,7 +158,7 @@ def set_up(chosen, count, records, left, top, columns, rows, farthest, setup):
     return simd.bits(live & seen & ~(out0 | out1 | out2))
 
 
-@inlined
+@inlined_by_value
 def draw_column(n, i, j, last, edges, x, y, plane, record, depths, owners):
     """Rasterise rows j..last of n columns from i on; the tile begins at (x, y)."""
     (a0, a1, a2), (b0, b1, b2), (c0, c1, c2) = edges
@@ -269,7 +268,7 @@ def write_tile(
 
 @parallel_kernel
 def draw_tiles(
-    tile_start, bins, records, tiles_x, cx, cy, workers, fresh, depth, ddx, ddy, prim_id
+    share, tile_start, bins, records, tiles_x, cx, cy, fresh, depth, ddx, ddy, prim_id
 ):  # fmt: skip
     """Draw every bin over what the images (H, W) already hold; (cx, cy) is the screen's centre.
 
@@ -284,63 +283,61 @@ def draw_tiles(
     ints, planes = borrowed(records.view(np.int32)), borrowed(records.view(np.float64))
     records = borrowed(records)
     depth, ddx, ddy, prim_id = borrowed(depth), borrowed(ddx), borrowed(ddy), borrowed(prim_id)
-    taken = np.zeros(1, np.int64)
-    for _ in prange(workers):
-        pixels = aligned(TILE * STRIDE)
-        depths = borrowed(pixels.view(np.float32)[: TILE * STRIDE])
-        owners = borrowed(pixels.view(np.int32)[TILE * STRIDE :])
-        lanes = aligned(SETUP_ROWS * LANES // 2)
-        farthest = np.empty(HALVES * STRIPS, np.int32)
-        setup = borrowed(lanes.view(np.int32))
-        chosen = np.zeros(LANES, np.int64)
-        order = np.empty(most, np.int64)
-        heads = np.empty(BUCKETS + 1, np.int32)
-        tile = fetch_add(taken.ctypes.data, 1)
-        while tile < tiles:
-            start, end = np.int64(tile_start[tile]), np.int64(tile_start[tile + 1])
-            if fresh or end > start:
-                left = (tile % tiles_x) << TILE_BITS
-                top = (tile // tiles_x) << TILE_BITS
-                columns, rows = min(TILE, width - left), min(TILE, height - top)
-                depths[:] = np.float32(0.0)
-                owners[:] = NOBODY
-                if not fresh:
-                    for j in range(rows):
-                        for i in range(columns):
-                            depths[j * STRIDE + i] = depth[top + j, left + i]
-                near_first(bins, start, end, order, heads)
-                at = np.int64(0)
-                while at < end - start:
-                    hidden = max(find_farthest(depths, columns, rows, farthest), NOTHING + 1)
-                    count = 0
-                    while count < LANES and at < end - start:
-                        entry = order[at]
-                        at += 1
-                        if entry >> 32 >= hidden:
-                            chosen[count] = entry
-                            count += 1
-                    seen = set_up(chosen, count, records, left, top, columns, rows, farthest, setup)
-                    while seen != 0:
-                        lane = simd.lowest(seen)
-                        seen &= seen - 1
-                        draw(
-                            chosen[lane], lane, setup, records, planes, left + 0.5 - cx,
-                            top + 0.5 - cy, depths, owners,
-                        )  # fmt: skip
-                write_tile(
-                    left, top, columns, rows, fresh, depths, owners, ints,
-                    depth, ddx, ddy, prim_id,
-                )  # fmt: skip
-            tile = fetch_add(taken.ctypes.data, 1)
-        keep(pixels)
-        keep(lanes)
+    pixels = aligned(TILE * STRIDE)
+    depths = borrowed(pixels.view(np.float32)[: TILE * STRIDE])
+    owners = borrowed(pixels.view(np.int32)[TILE * STRIDE :])
+    lanes = aligned(SETUP_ROWS * LANES // 2)
+    farthest = np.empty(HALVES * STRIPS, np.int32)
+    setup = borrowed(lanes.view(np.int32))
+    chosen = np.zeros(LANES, np.int64)
+    order = np.empty(most, np.int64)
+    heads = np.empty(BUCKETS + 1, np.int32)
+    tile = take(share, 1)
+    while tile < tiles:
+        start, end = np.int64(tile_start[tile]), np.int64(tile_start[tile + 1])
+        if fresh or end > start:
+            left = (tile % tiles_x) << TILE_BITS
+            top = (tile // tiles_x) << TILE_BITS
+            columns, rows = min(TILE, width - left), min(TILE, height - top)
+            depths[:] = np.float32(0.0)
+            owners[:] = NOBODY
+            if not fresh:
+                for j in range(rows):
+                    for i in range(columns):
+                        depths[j * STRIDE + i] = depth[top + j, left + i]
+            near_first(bins, start, end, order, heads)
+            at = np.int64(0)
+            while at < end - start:
+                hidden = max(find_farthest(depths, columns, rows, farthest), NOTHING + 1)
+                count = 0
+                while count < LANES and at < end - start:
+                    entry = order[at]
+                    at += 1
+                    if entry >> 32 >= hidden:
+                        chosen[count] = entry
+                        count += 1
+                seen = set_up(chosen, count, records, left, top, columns, rows, farthest, setup)
+                while seen != 0:
+                    lane = simd.lowest(seen)
+                    seen &= seen - 1
+                    draw(
+                        chosen[lane], lane, setup, records, planes, left + 0.5 - cx,
+                        top + 0.5 - cy, depths, owners,
+                    )  # fmt: skip
+            write_tile(
+                left, top, columns, rows, fresh, depths, owners, ints,
+                depth, ddx, ddy, prim_id,
+            )  # fmt: skip
+        tile = take(share, 1)
+    keep(pixels)
+    keep(lanes)
 
 
 @parallel_kernel
-def quad_differences(depth, ddx, ddy):
+def quad_differences(share, depth, ddx, ddy):
     """Replace ddx, ddy (H, W) by differences of depth within aligned quads of 2x2 pixels."""
     height, width = depth.shape
-    for j in prange(height):
+    for j in part(share, height):
         # The last row of an odd height pairs with the one before it.
         j0 = min(j & ~1, max(height - 2, 0))
         j1 = min(j0 + 1, height - 1)

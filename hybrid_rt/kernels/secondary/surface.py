@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import prange
 
-from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+from hybrid_rt.kernels._jit import called, inlined, parallel_kernel
+from hybrid_rt.kernels._queue import part
 from hybrid_rt.kernels.secondary.philox import uniform_pair
 from hybrid_rt.kernels.secondary.sampling import (
     cosine_hemisphere,
@@ -49,10 +49,10 @@ MORTON = _morton_order()
 
 
 @parallel_kernel
-def count_covered(prim_id, tiles_x, counts):
+def count_covered(share, prim_id, tiles_x, counts):
     """Count the covered pixels of each tile; prim_id (H, W), counts (tiles,) int64."""
     height, width = prim_id.shape
-    for tile in prange(counts.shape[0]):
+    for tile in part(share, counts.shape[0]):
         x0 = (tile % tiles_x) << TILE_LOG2
         y0 = (tile // tiles_x) << TILE_LOG2
         n = 0
@@ -183,7 +183,7 @@ def aim(kind, x, y, d, n, o, alpha, reach, light, seed):
     return towards_light(o, light, u1, u2)
 
 
-@kernel
+@called
 def tile_rays(
     kind, alpha, reach, light, seed, first, x0, y0, prim_id, depth, vertices, faces,
     eye, right, up, forward, inv_focal, near,
@@ -225,7 +225,7 @@ def tile_rays(
 
 @parallel_kernel
 def surface_rays(
-    kind, alpha, reach, light, seed, prim_id, depth, vertices, faces,
+    share, kind, alpha, reach, light, seed, prim_id, depth, vertices, faces,
     eye, right, up, forward, inv_focal, near, tiles_x, starts,
     origin, direction, pixel, t_near, t_far, kept,
 ):  # fmt: skip
@@ -236,7 +236,7 @@ def surface_rays(
     float32, starts (tiles,) int64: the first ray of each tile. Outputs (N, 3), (N, 3) float32,
     (N, 2) int32, (N,) float32 twice, (N,) bool: whether there is such a ray at all.
     """
-    for tile in prange(starts.shape[0]):
+    for tile in part(share, starts.shape[0]):
         tile_rays(
             kind, alpha, reach, light, seed, starts[tile],
             (tile % tiles_x) << TILE_LOG2, (tile // tiles_x) << TILE_LOG2,

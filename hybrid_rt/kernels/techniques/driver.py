@@ -7,11 +7,10 @@ them, and Numba puts that function into a copy of the loop.
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 from numba.extending import overload
 
-from hybrid_rt.kernels._jit import OPTIONS, kernel, parallel_kernel
-from hybrid_rt.kernels._queue import fetch_add
+from hybrid_rt.kernels._jit import OPTIONS, called, parallel_kernel
+from hybrid_rt.kernels._queue import take
 from hybrid_rt.kernels.techniques.screen import CHUNK, screen_ray, write_row
 
 
@@ -38,7 +37,7 @@ def marches(numbers_class):
     return decorate
 
 
-@kernel
+@called
 def march_chunk(first, last, rays, view, buffers, pyramid, numbers, out, steps_by_level):
     """Set up rays in float64, march them in float32 and write their rows of the outputs."""
     height, width = buffers.depth.shape
@@ -52,19 +51,17 @@ def march_chunk(first, last, rays, view, buffers, pyramid, numbers, out, steps_b
 
 
 @parallel_kernel
-def march(workers, rays, view, buffers, pyramid, numbers, out, steps_by_level):
+def march(share, rays, view, buffers, pyramid, numbers, out, steps_by_level):
     """March rays; out (N,), steps_by_level (workers, L) int64 is added to.
 
     rays, view, buffers, pyramid, out: as in `hybrid_rt.kernels.arrays`; pyramid may be () for a
     technique that reads none.
     """
     n = len(rays.t_near)
-    taken = np.zeros(1, np.int64)
-    for worker in prange(workers):
-        first = fetch_add(taken.ctypes.data, CHUNK)
-        while first < n:
-            march_chunk(
-                first, min(n, first + CHUNK), rays, view, buffers, pyramid, numbers, out,
-                steps_by_level[worker],
-            )  # fmt: skip
-            first = fetch_add(taken.ctypes.data, CHUNK)
+    first = take(share, CHUNK)
+    while first < n:
+        march_chunk(
+            first, min(n, first + CHUNK), rays, view, buffers, pyramid, numbers, out,
+            steps_by_level[share.worker],
+        )  # fmt: skip
+        first = take(share, CHUNK)

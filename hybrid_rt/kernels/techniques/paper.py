@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid_rt.kernels._jit import kernel
+from hybrid_rt.kernels._jit import called
 from hybrid_rt.kernels.techniques.driver import marches
 from hybrid_rt.kernels.techniques.screen import (
     EXHAUSTED,
@@ -22,7 +22,7 @@ from hybrid_rt.kernels.techniques.screen import (
 )
 
 
-@kernel
+@called
 def tilted_plane_s(i, j, buffers, line, axes, s_start, s_end):
     """Return the s at which the ray meets the plane of pixel (i, j) inside that pixel, or -1.
 

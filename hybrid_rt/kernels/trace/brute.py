@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import prange
 
 from hybrid_rt.kernels._jit import inlined, parallel_kernel
+from hybrid_rt.kernels._queue import part
 from hybrid_rt.kernels.triangle import frame, intersect, normal
 
 LARGEST = float(np.finfo(np.float32).max)
@@ -38,10 +38,10 @@ def _is_ray(o, d):
 
 @parallel_kernel
 def nearest(
-    origin, direction, t_near, t_far, vertices, faces, t, prim_id, u, v, n_g
+    share, origin, direction, t_near, t_far, vertices, faces, t, prim_id, u, v, n_g
 ):  # fmt: skip
     """Nearest hits of (N, 3) rays among all (F, 3) faces."""
-    for i in prange(len(origin)):
+    for i in part(share, len(origin)):
         best = -1
         best_t, best_u, best_v = np.inf, 0.0, 0.0
         gx, gy, gz = 0.0, 0.0, 0.0

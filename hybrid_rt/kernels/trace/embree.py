@@ -13,20 +13,42 @@ by which the direction was multiplied.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import prange, types
+from numba import types
 from numba.extending import intrinsic
+from numpy.typing import NDArray
 
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._aligned import aligned
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
-from hybrid_rt.kernels._queue import fetch_add
+from hybrid_rt.kernels._queue import take
 from hybrid_rt.kernels.simd import WIDTH
 
 SCALE = 21
 FIELDS = 22
+
+
+class Query(NamedTuple):
+    """What is asked of Embree.
+
+    `function`, `scene` and `arguments` are addresses: the call for `width`, the RTCScene and the
+    RTCIntersectArguments or RTCOccludedArguments. With `indexed` only the rays at `indices` (M,)
+    int32 are traced, in that order, and no other row is written. With `by_direction` those of a
+    chunk are traced sorted by where they go.
+    """
+
+    function: int
+    scene: int
+    arguments: int
+    width: int
+    indexed: bool
+    indices: NDArray[np.int32]
+    by_direction: bool
+
+
 LARGEST = np.float32(np.finfo(np.float32).max)
 SHORT, LONG = np.float32(2.0**-40), np.float32(2.0**40)  # of directions given as they are
 CELLS = 24  # of directions: octants times longest axis
@@ -248,8 +270,9 @@ def _store_vectors(i, n, packet, words, t, prim_id, u, v, n_g):
 
 
 @inlined
-def _store(first, count, width, in_order, queue, packet, words, t, prim_id, u, v, n_g):
+def _store(first, count, width, in_order, queue, packet, words, hits):
     """Write the hits of a packet; what Embree left in the fields of a miss is not looked at."""
+    t, prim_id, u, v, n_g = hits
     nothing = np.float32(0.0)
     if width == WIDTH and in_order:
         _store_vectors(queue[first], count - first, packet, words, t, prim_id, u, v, n_g)
@@ -277,74 +300,52 @@ def _query(function, scene, arguments, width, packet, valid):
         _call4(function, valid.ctypes.data, scene, packet.ctypes.data, arguments)
 
 
-@parallel_kernel
-def intersect(
-    function, scene, arguments, width, workers, indexed, indices, by_direction,
-    origin, direction, t_near, t_far,
-    t, prim_id, u, v, n_g,
-):  # fmt: skip
-    """Nearest hits of (N, 3) rays by rtcIntersect1/4/8/16, written to the rows of the rays.
+@inlined
+def _store_occluded(first, count, width, in_order, queue, packet, words, hit):
+    """Write which rays of a packet hit anything."""
+    for k in range(width):
+        if first + k >= count:
+            break
+        # Embree writes tfar = -inf for an occluded ray and leaves a masked lane alone.
+        hit[np.uint64(queue[first + k])] = packet[8 * width + k] == -np.inf
 
-    `function`, `scene` and `arguments` are addresses: the call for `width`, the RTCScene and the
-    RTCIntersectArguments. With `indexed` only the rays at `indices` (M,) int32 are traced, in that
-    order, and no other row is written. With `by_direction` those of a chunk are traced sorted by
-    where they go. `workers` threads take chunks of rays from a common counter, since a chunk of sky
-    costs a fraction of a chunk of foliage; which thread traces a ray does not show.
+
+@inlined
+def _trace(share, query, rays, store, answers):
+    """Trace rays in packets and store their answers by a function; see `intersect`."""
+    width, indexed, indices, by_direction = query[3:]
+    origin, direction, _, t_near, t_far = rays
+    count = len(indices) if indexed else len(origin)
+    in_order = not (indexed or by_direction)
+    packet, words, valid = _packet(width)
+    queue, keys, ends = _queue()
+    start = take(share, CHUNK)
+    while start < count:
+        length = min(CHUNK, count - start)
+        _take(start, start + length, indexed, indices, by_direction, direction, queue, keys, ends)
+        for first in range(0, length, width):
+            if _load(
+                first, length, width, in_order, queue,
+                origin, direction, t_near, t_far, packet, words, valid,
+            ):  # fmt: skip
+                _query(query.function, query.scene, query.arguments, width, packet, valid)
+            store(first, length, width, in_order, queue, packet, words, answers)
+        start = take(share, CHUNK)
+
+
+@parallel_kernel
+def intersect(share, query, rays, hits):
+    """Nearest hits of rays by rtcIntersect1/4/8/16, written to the rows of the rays.
+
+    Threads take chunks of rays from a common counter; which one traces a ray does not show.
     """
-    count = len(indices) if indexed else len(origin)
-    in_order = not (indexed or by_direction)
-    taken = np.zeros(1, np.int64)
-    for _ in prange(workers):
-        packet, words, valid = _packet(width)
-        queue, keys, ends = _queue()
-        start = fetch_add(taken.ctypes.data, CHUNK)
-        while start < count:
-            length = min(CHUNK, count - start)
-            _take(
-                start, start + length, indexed, indices, by_direction, direction, queue, keys, ends
-            )
-            for first in range(0, length, width):
-                if _load(
-                    first, length, width, in_order, queue,
-                    origin, direction, t_near, t_far, packet, words, valid,
-                ):  # fmt: skip
-                    _query(function, scene, arguments, width, packet, valid)
-                _store(first, length, width, in_order, queue, packet, words, t, prim_id, u, v, n_g)
-            start = fetch_add(taken.ctypes.data, CHUNK)
+    _trace(share, query, rays, _store, hits)
 
 
 @parallel_kernel
-def occluded(
-    function, scene, arguments, width, workers, indexed, indices, by_direction,
-    origin, direction, t_near, t_far,
-    hit,
-):  # fmt: skip
-    """Whether (N, 3) rays hit anything, by rtcOccluded1/4/8/16; arguments as in `intersect`."""
-    count = len(indices) if indexed else len(origin)
-    in_order = not (indexed or by_direction)
-    taken = np.zeros(1, np.int64)
-    for _ in prange(workers):
-        packet, words, valid = _packet(width)
-        queue, keys, ends = _queue()
-        start = fetch_add(taken.ctypes.data, CHUNK)
-        while start < count:
-            length = min(CHUNK, count - start)
-            _take(
-                start, start + length, indexed, indices, by_direction, direction, queue, keys, ends
-            )
-            for first in range(0, length, width):
-                if _load(
-                    first, length, width, in_order, queue,
-                    origin, direction, t_near, t_far, packet, words, valid,
-                ):  # fmt: skip
-                    _query(function, scene, arguments, width, packet, valid)
-                for k in range(width):
-                    if first + k >= length:
-                        break
-                    # Embree writes tfar = -inf for an occluded ray and leaves a masked lane alone.
-                    i = np.uint64(queue[first + k])
-                    hit[i] = packet[8 * width + k] == -np.inf
-            start = fetch_add(taken.ctypes.data, CHUNK)
+def occluded(share, query, rays, hit):
+    """Whether rays hit anything, (N,) bool, by rtcOccluded1/4/8/16; as `intersect`."""
+    _trace(share, query, rays, _store_occluded, hit)
 
 
 @kernel

@@ -12,8 +12,10 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from hybrid_rt_bench import cli, measure
-from hybrid_rt_bench.results import HYBRID_STAGES, STAGES
+from hybrid_rt_bench import cli
+from hybrid_rt_bench.kinds.paper import cell as measure
+from hybrid_rt_bench.kinds.paper.columns import STAGES
+from hybrid_rt_bench.results.schema import HYBRID_STAGES
 
 TINY = ("--resolutions", "96x54", "--threads", "1")
 

@@ -6,7 +6,8 @@ import sys
 import pandas as pd
 import pytest
 
-from hybrid_rt_bench import cli, error_cell
+from hybrid_rt_bench import cli
+from hybrid_rt_bench.judged import cell as error_cell
 
 TINY = """
 schema = 1
@@ -71,7 +72,9 @@ def test_a_run_is_measured_kept_and_shown_again(monkeypatch, capsys, tmp_path, e
     samples = pd.read_parquet(folder / "samples.parquet")
     assert len(samples) == 2 * len(timed)
     meta = json.loads((folder / "run.json").read_text())
-    assert set(meta["compile_seconds"]) == {"mirror", "ambient_occlusion"}
+    assert set(meta["compile_seconds"]) == {
+        "raster", "paper", "hiz", "certified", "mirror rays", "ambient_occlusion rays"
+    }  # fmt: skip
     assert {cell["timed"] for cell in meta["cells"]} == {True, False}
     text = (folder / "tables.md").read_text()
     assert "### Speed against error" in text
@@ -107,7 +110,7 @@ def test_ctrl_c_keeps_what_is_finished(monkeypatch, capsys, tmp_path, experiment
     measure_cell, done = error_cell.measure_cell, []
 
     def stops(*arguments):
-        if len(done) == 5:  # two workloads, each twice to compile, and one cell
+        if len(done) == 11:  # three techniques and two workloads, each twice, and one cell
             raise KeyboardInterrupt
         done.append(1)
         return measure_cell(*arguments)
@@ -142,15 +145,16 @@ def test_wrong_settings_are_refused_before_measuring(
 
 
 @pytest.mark.parametrize(
-    ("points", "title"),
+    ("kind", "points", "title"),
     [
-        ("switches", "What each part of the certified march is worth"),
-        ("cheapest", "Speed-up of the certified hybrid over the strongest Embree"),
+        ("ablation", "switches", "What each part of the certified march is worth"),
+        ("hybrid", "cheapest", "Speed-up of the certified hybrid over the strongest Embree"),
     ],
 )
-def test_points_with_tables_of_their_own(monkeypatch, capsys, tmp_path, points, title):
+def test_points_with_tables_of_their_own(monkeypatch, capsys, tmp_path, kind, points, title):
     """What `run ablation` and `run hybrid` do, on one small view at two sizes."""
     text = TINY.replace('"paper", "hiz", "certified"', '"certified", "paper"')
+    text = text.replace('kind = "error"', f'kind = "{kind}"')
     text = text.replace('counted = ["paper", "certified"]', 'counted = ["certified"]')
     text = text.replace('timed = ["64x48"]', 'timed = ["64x48", "80x60"]\ncomplete = ["64x48"]')
     text = text.replace('picture = "64x48"\n', "").split("[[workloads]]")[0]

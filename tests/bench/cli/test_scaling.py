@@ -9,8 +9,9 @@ import pandas as pd
 import psutil
 import pytest
 
-from hybrid_rt_bench import cli, scaling_run
-from hybrid_rt_bench.scaling_worker import Worker, WorkerError
+from hybrid_rt_bench import cli
+from hybrid_rt_bench.executors.processes import Worker, WorkerError
+from hybrid_rt_bench.kinds.scaling import run as scaling_run
 from support import PYTHONPATH
 
 TINY = """
@@ -76,7 +77,7 @@ def test_a_run_is_measured_kept_shown_again_and_compared(monkeypatch, capsys, tm
     cells = results.drop_duplicates(["series", "x"])
     assert list(cells[cells.series == "size"].triangles) == [1024, 2048, 4096]
     assert list(cells[cells.series == "picture"].x) == [64 * 48, 96 * 64]
-    assert set(results[results.series == "size"].stage) >= {"build", "brute_force", "raster_lists"}
+    assert set(results[results.series == "size"].stage) >= {"build", "brute_force", "prepare"}
     assert "build" not in set(results[results.series == "picture"].stage)
     assert (results.ms > 0).all()
     assert set(results.rounds) == {2}
@@ -86,7 +87,7 @@ def test_a_run_is_measured_kept_shown_again_and_compared(monkeypatch, capsys, tm
     assert set(counts) == {2}
     meta = json.loads((folder / "run.json").read_text())
     assert (meta["kind"], meta["finished"]) == ("scaling", True)
-    assert meta["compile_seconds"]["all stages"] >= 0
+    assert set(meta["compile_seconds"]) == {"raster and Embree", "paper", "certified"}
     assert all(cell["compile_seconds"] >= 0 for cell in meta["cells"])
     text = (folder / "tables.md").read_text()
     for title in ("Growth from", "Exponents: time as a power of pixels", "Peak memory"):
@@ -138,11 +139,11 @@ def test_a_process_that_ends_keeps_its_rounds_and_costs_no_other(
     monkeypatch, capsys, tmp_path, experiment
 ):
     class Frail(Worker):
-        def visit(self, number, warmup):
+        def ask(self, number, warmup):
             if number == 1 and not Frail.lost:
                 Frail.lost = True
                 self.process.kill()
-            return super().visit(number, warmup)
+            return super().ask(number, warmup)
 
     Frail.lost = False
     monkeypatch.setattr(scaling_run, "Worker", Frail)
@@ -163,14 +164,14 @@ def test_ctrl_c_keeps_what_is_measured_and_ends_the_processes(
     made = []
 
     class Stopped(Worker):
-        def __init__(self, task):
-            super().__init__(task)
+        def __init__(self, make, task):
+            super().__init__(make, task)
             made.append(self)
 
-        def visit(self, number, warmup):
+        def ask(self, number, warmup):
             if number == 1:
                 raise KeyboardInterrupt
-            return super().visit(number, warmup)
+            return super().ask(number, warmup)
 
     monkeypatch.setattr(scaling_run, "Worker", Stopped)
     code, _, err = run(

@@ -1,6 +1,5 @@
 """``hybrid-rt run stability``, in this process."""
 
-import dataclasses
 import json
 import sys
 
@@ -8,8 +7,8 @@ import pandas as pd
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt_bench import cli, stability
-from hybrid_rt_bench.techniques import TECHNIQUES
+from hybrid_rt_bench import cli
+from hybrid_rt_bench.kinds.stability import run as stability
 
 CASES = "screen_axes,parallel_to_image,zero_area"
 
@@ -24,9 +23,9 @@ def invoke(monkeypatch, *arguments):
 
 @pytest.fixture
 def only_paper(monkeypatch):
-    techniques = {"paper": TECHNIQUES["paper"]}
+    """Let these be all techniques there are."""
+    techniques = {"paper": hrt.Paper}
     monkeypatch.setattr(stability, "TECHNIQUES", techniques)
-    monkeypatch.setattr(stability, "get_technique", techniques.__getitem__)
     return techniques
 
 
@@ -63,7 +62,11 @@ def test_other_techniques_may_fail(monkeypatch, tmp_path, capsys, only_paper):
 
 def test_a_promise_that_certified_breaks_gives_code_3(monkeypatch, tmp_path, capsys, only_paper):
     """A march that proves nothing, under the name of the one that does."""
-    only_paper["certified"] = dataclasses.replace(TECHNIQUES["paper"], name="certified")
+
+    class Unproven(hrt.Paper):
+        name = "certified"
+
+    only_paper["certified"] = Unproven
     code = invoke(monkeypatch, "run", "stability", "--cases", CASES, "--out", tmp_path, "--json")
     printed = capsys.readouterr()
     assert code == 3
@@ -82,13 +85,12 @@ def test_a_promise_that_certified_breaks_gives_code_3(monkeypatch, tmp_path, cap
 
 def test_a_technique_that_raises_fails_its_cases_only(monkeypatch, tmp_path, capsys, only_paper):
     class Broken(hrt.Paper):
-        def __getattribute__(self, name):
-            if name == "samples":
-                raise ValueError("no samples today")
-            return super().__getattribute__(name)
+        name = "broken"
 
-    broken = object.__new__(Broken)
-    only_paper["broken"] = dataclasses.replace(TECHNIQUES["paper"], name="broken", mode=broken)
+        def _march(self, *_):
+            raise ValueError("no samples today")
+
+    only_paper["broken"] = Broken
     code = invoke(monkeypatch, "run", "stability", "--cases", "screen_axes", "--out", tmp_path)
     printed = capsys.readouterr()
     assert code == 0

@@ -4,16 +4,18 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt_bench import error_cell, image_error, shade
-from hybrid_rt_bench.error_run import plan_cells
-from hybrid_rt_bench.error_spec import ErrorExperiment
-from hybrid_rt_bench.measure import prepare
-from hybrid_rt_bench.points import CHEAPEST, LISTS, SWITCHES, ListsForm, View, points_of
-from hybrid_rt_bench.pooling import VERDICTS
-from hybrid_rt_bench.queries import AnyHit, NearestHit
-from hybrid_rt_bench.spec import Resolution, load_experiment, parse_experiment
-from hybrid_rt_bench.techniques import TECHNIQUES, get_technique
-from hybrid_rt_bench.workloads import get_workload
+from hybrid_rt_bench.experiments import load_experiment, parse_experiment
+from hybrid_rt_bench.judged import cell as error_cell
+from hybrid_rt_bench.judged import image_error
+from hybrid_rt_bench.judged.columns import MAP_CLASSES, VERDICTS
+from hybrid_rt_bench.judged.run import plan_cells
+from hybrid_rt_bench.kinds.error.spec import ErrorExperiment
+from hybrid_rt_bench.measure import shade
+from hybrid_rt_bench.measure.experiment import Resolution
+from hybrid_rt_bench.measure.loaded import prepare
+from hybrid_rt_bench.measure.queries import AnyHit, NearestHit
+from hybrid_rt_bench.measure.screens import Screens, points_of
+from hybrid_rt_bench.measure.workloads import get_workload
 from hybrid_rt_scenes import get_scene
 
 TEXT = """
@@ -39,6 +41,13 @@ seeds = 2
 """
 
 
+TECHNIQUES = ("linear", "dda", "hiz", "paper", "slope", "certified")
+
+
+def screens_of(scene, camera):
+    return Screens(hrt.rasterize(scene, camera, threads=1), 1)
+
+
 @pytest.fixture(scope="module")
 def cornell():
     return get_scene("cornell")
@@ -48,17 +57,13 @@ def cornell():
 def measured(cornell):
     """Measure the mirror and the shadow rays of a small view, all techniques' default points."""
     loaded = prepare(cornell.load(), 1)
-    view = View(loaded.scene, cornell.camera(next(iter(cornell.cameras)), 64, 48), 1)
-    points = [
-        point
-        for technique in TECHNIQUES.values()
-        for point in points_of(technique, loaded.scene, "default")
-    ]
+    screens = screens_of(loaded.scene, cornell.camera(next(iter(cornell.cameras)), 64, 48))
+    points = [point for name in TECHNIQUES for point in points_of(hrt.TECHNIQUES[name], "default")]
     found = {}
     for name, query in (("mirror", NearestHit()), ("shadow_point", AnyHit())):
-        rays = get_workload(name).make(cornell, view.gbuffer, 0)
+        rays = get_workload(name).make(cornell, screens.gbuffer, 0)
         cell = error_cell.Cell(query, rays, points, 2, name == "mirror", 1024)
-        found[name] = error_cell.measure_cell(loaded, view, cell)
+        found[name] = error_cell.measure_cell(loaded, screens, cell)
     return found
 
 
@@ -96,14 +101,13 @@ def test_other_resolutions_are_timed_as_far_as_they_were_meant_to_be():
     assert (changed.timed, changed.picture, changed.rounds) == ([other], other, 5)
 
 
-def test_cells_are_timed_or_counted_as_the_settings_say(cornell):
+def test_cells_are_timed_or_counted_as_the_settings_say():
     experiment = parse_experiment(TEXT, source="x.toml")
-    techniques = {name: get_technique(name) for name in experiment.techniques}
-    scene = cornell.load()
+    techniques = {name: hrt.TECHNIQUES[name] for name in experiment.techniques}
 
     def planned(resolution, camera):
-        cells = plan_cells(experiment, techniques, scene, resolution, camera)
-        return [(c.entry.name, c.seed, c.timed, {p.technique for p in c.points}) for c in cells]
+        cells = plan_cells(experiment, techniques, resolution, camera)
+        return [(c.entry.name, c.seed, c.timed, {p.name for p in c.points}) for c in cells]
 
     small, large = experiment.resolutions
     both, one = {"paper", "hiz"}, {"paper"}
@@ -112,111 +116,22 @@ def test_cells_are_timed_or_counted_as_the_settings_say(cornell):
     ]  # fmt: skip
     assert planned(small, 1)[1] == ("diffuse", 0, False, one)
     assert all(not timed and names == one for _, _, timed, names in planned(large, 0))
-    grid = plan_cells(experiment, techniques, scene, small, 0)[0]
-    assert len(grid.points) == sum(len(t.points(scene)) for t in techniques.values())
+    grid = plan_cells(experiment, techniques, small, 0)[0]
+    assert len(grid.points) == sum(len(t.points()) for t in techniques.values())
     assert grid.passes(2) == len(grid.points) + 2 * (len(grid.points) + 2)
 
 
-@pytest.mark.parametrize("name", TECHNIQUES)
-def test_every_technique_has_one_default_point_and_labels_that_differ(name, cornell):
-    points = points_of(TECHNIQUES[name], cornell.load(), "all")
-    assert sum(point.default for point in points) == 1
-    assert len({point.label for point in points}) == len(points)
-    (usual,) = points_of(TECHNIQUES[name], cornell.load(), "default")
-    assert usual in points
-
-
-def test_every_switch_is_one_change_of_the_default_and_none_is_measured_twice(cornell):
-    points = points_of(TECHNIQUES["certified"], cornell.load(), "switches")
-    base, *others = points
-    assert (base.label, base.default, base.lists) == ("base", True, ListsForm())
-    assert base.mode == TECHNIQUES["certified"].mode
-    assert not any(point.default for point in others)
-    assert len({point.label for point in points}) == len(points)
-    assert len({(point.mode, point.lists) for point in points}) == len(points)
-    # Left out is only what the default is already.
-    left = {label for label, *_ in SWITCHES} - {point.label for point in points}
-    assert len(left) <= 5
-    assert f"lists {base.lists.length}" in left
-    by_label = {point.label: point for point in points}
-    assert by_label["no planes"].lists == ListsForm(planes=False)
-    assert by_label["no planes"].mode == base.mode
-    assert by_label["one ray at a time"].mode.vectors is False
-    assert by_label["4x4 cells, guard x2"].lists == ListsForm(cell=4, guard=2.0)
-    cheap = by_label[CHEAPEST[0]]
-    assert (cheap.mode.max_tests, cheap.mode.max_steps, cheap.mode.probes) == (4, 32, 1)
-
-
-def test_the_usual_runs_have_a_small_grid_of_certified(cornell):
-    scene = cornell.load()
-    assert len(points_of(TECHNIQUES["certified"], scene, "all")) == len(LISTS) <= 5
-    assert [p.label for p in points_of(TECHNIQUES["certified"], scene, "cheapest")] == [
-        "base", CHEAPEST[0],
-    ]  # fmt: skip
-    for name in ("paper", "slope", "hiz", "linear", "dda"):
-        usual = points_of(TECHNIQUES[name], scene, "default")
-        assert points_of(TECHNIQUES[name], scene, "switches") == usual
-        assert points_of(TECHNIQUES[name], scene, "cheapest") == usual
-
-
-def test_lists_have_the_size_that_their_form_says(cornell):
-    camera = cornell.camera(next(iter(cornell.cameras)), 64, 48)
-    assert ListsForm().camera(camera) == camera
-    sizes = {
-        ListsForm(cell=4): (16, 12), ListsForm(guard=1.5): (96, 72),
-        ListsForm(cell=4, guard=2.0): (32, 24), ListsForm(cell=100): (1, 1),
-    }  # fmt: skip
-    for form, size in sizes.items():
-        seen = form.camera(camera)
-        assert (seen.width, seen.height, seen.eye) == (*size, camera.eye)
-    wide = ListsForm(cell=4, guard=2.0).camera(camera)
-    half = np.tan(np.radians(camera.vfov_deg) / 2)
-    assert np.tan(np.radians(wide.vfov_deg) / 2) == pytest.approx(2 * half)
-
-
-def test_each_form_of_the_lists_is_made_once_and_marched_through():
-    sphere = get_scene("sphere")
-    scene = sphere.load()
-    view = View(scene, sphere.camera("front", 64, 48), 1)
-    points = points_of(TECHNIQUES["certified"], scene, "switches")
-    by_label = {point.label: point for point in points}
-    rays = hrt.mirror_rays(view.gbuffer)
-    found = {}
-    for label in ("base", "no planes", "4x4 cells", "4x4 cells, guard x2", "guard x2"):
-        screen = view.screen(by_label[label])
-        assert view.screen(by_label[label]) is screen
-        found[label] = hrt.march(rays, screen.gbuffer, screen.pyramid, by_label[label].mode)
-    assert view.screen(by_label["no hand-over"]) is view.screen(by_label["base"])
-    planes, none = (view.screen(by_label[label]) for label in ("base", "no planes"))
-    assert planes.lists.prim_id is none.lists.prim_id
-    assert np.isnan(none.lists.planes).all()
-    assert not np.isnan(planes.lists.planes).all()
-    assert found["no planes"].tests > found["base"].tests
-    both = found["base"].resolved & found["no planes"].resolved
-    assert both.any()
-    assert (found["base"].prim_id[both] == found["no planes"].prim_id[both]).all()
-    coarse, guarded = (view.screen(by_label[f"4x4 cells{g}"]) for g in ("", ", guard x2"))
-    assert coarse.lists.rest.shape == (12, 16)
-    assert guarded.lists.rest.shape == (24, 32)
-    assert coarse.nbytes < guarded.nbytes < planes.nbytes
-    offscreen = {
-        label: np.count_nonzero(marched.status == hrt.MarchStatus.OFFSCREEN)
-        for label, marched in found.items()
-    }
-    assert offscreen["guard x2"] < offscreen["base"]
-
-
-def test_only_complete_cells_have_all_techniques_and_embrees_modes(cornell):
+def test_only_complete_cells_have_all_techniques_and_embrees_modes():
     text = TEXT.replace('timed = ["64x48"]', 'timed = ["64x48", "128x96"]\ncomplete = ["64x48"]')
     experiment = parse_experiment(text, source="x.toml")
-    techniques = {name: get_technique(name) for name in experiment.techniques}
+    techniques = {name: hrt.TECHNIQUES[name] for name in experiment.techniques}
     small, large = (
-        plan_cells(experiment, techniques, cornell.load(), resolution, 0)[0]
+        plan_cells(experiment, techniques, resolution, 0)[0]
         for resolution in experiment.resolutions
     )
     assert (small.timed, small.rivals, large.timed, large.rivals) == (True, True, True, False)
-    assert {point.technique for point in small.points} == {"paper", "hiz"}
-    assert {point.technique for point in large.points} == {"paper"}
+    assert {point.name for point in small.points} == {"paper", "hiz"}
+    assert {point.name for point in large.points} == {"paper"}
     assert len(large.points) == 4  # of the whole grid
     assert large.passes(2) == 4 + 2 * 4
     other = Resolution(width=32, height=24)
@@ -228,11 +143,11 @@ def test_only_complete_cells_have_all_techniques_and_embrees_modes(cornell):
 
 def test_a_cell_without_rivals_times_its_points_alone(cornell):
     loaded = prepare(cornell.load(), 1)
-    view = View(loaded.scene, cornell.camera(next(iter(cornell.cameras)), 64, 48), 1)
-    points = points_of(TECHNIQUES["certified"], loaded.scene, "cheapest")
-    rays = hrt.mirror_rays(view.gbuffer)
+    screens = screens_of(loaded.scene, cornell.camera(next(iter(cornell.cameras)), 64, 48))
+    points = points_of(hrt.Certified, "cheapest")
+    rays = hrt.mirror_rays(screens.gbuffer)
     cell = error_cell.Cell(NearestHit(), rays, points, 2, False, 1024, rivals=False)
-    record = error_cell.measure_cell(loaded, view, cell)
+    record = error_cell.measure_cell(loaded, screens, cell)
     assert [row["point"] for row in record.results] == [point.label for point in points]
     assert len(record.samples) == 2 * len(points)
     assert all(row["speedup"] > 0 and row["prepare_mib"] > 0 for row in record.results)
@@ -283,7 +198,7 @@ def test_the_picture_shows_the_errors_that_were_counted(measured):
         if key in record.picture:
             classes = record.picture[key]
             for name in ("false_hit", "false_miss", "wrong_primitive"):
-                shown = np.count_nonzero(classes == error_cell.MAP_CLASSES[name])
+                shown = np.count_nonzero(classes == MAP_CLASSES[name])
                 assert shown == row[f"all_{name}"]
     assert measured["shadow_point"].picture is None
 
@@ -301,16 +216,16 @@ def test_an_image_is_no_distance_from_itself_and_some_from_another():
 
 def test_the_reflection_changes_with_what_is_met_and_where(cornell):
     scene = cornell.load()
-    view = View(scene, cornell.camera(next(iter(cornell.cameras)), 48, 36), 1)
-    rays = hrt.mirror_rays(view.gbuffer)
+    gbuffer = hrt.rasterize(scene, cornell.camera(next(iter(cornell.cameras)), 48, 36))
+    rays = hrt.mirror_rays(gbuffer)
     hits = hrt.EmbreeTracer(scene, threads=1).intersect(rays)
-    image = shade.reflection(view.gbuffer, rays, hits)
+    image = shade.reflection(gbuffer, rays, hits)
     assert (image.min() >= 0) & (image.max() <= 1)
     moved = hrt.Hits(hits.t * np.float32(0.9), hits.prim_id, hits.u, hits.v, hits.n_g)
     missed = hrt.Hits.empty(len(rays))
     met = np.zeros(image.shape[:2], bool)
     met[rays.pixel[:, 1], rays.pixel[:, 0]] = hits.prim_id >= 0
     for other in (moved, missed):
-        changed = (shade.reflection(view.gbuffer, rays, other) != image).any(axis=2)
+        changed = (shade.reflection(gbuffer, rays, other) != image).any(axis=2)
         assert (changed <= met).all()
         assert changed.sum() > 0.9 * met.sum()

@@ -12,15 +12,29 @@ import pandas as pd
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt_bench import agreement, cli, peers, peers_cell, peers_run, results
-from hybrid_rt_bench.peers import trial
-from hybrid_rt_bench.peers.base import Answers, Opened, Peer, PeerError, Picture, Query, View
-from hybrid_rt_bench.peers.ours import Embree
-from hybrid_rt_bench.peers_cell import Contender
-from hybrid_rt_bench.report import peers as peers_report
-from hybrid_rt_bench.report import render_run
-from hybrid_rt_bench.spec import load_experiment, parse_experiment
+from hybrid_rt_bench import cli
+from hybrid_rt_bench.experiments import load_experiment, parse_experiment
+from hybrid_rt_bench.kinds.peers import agreement, trial
+from hybrid_rt_bench.kinds.peers import cell as peers_cell
+from hybrid_rt_bench.kinds.peers import figures as peers_figures
+from hybrid_rt_bench.kinds.peers import programs as peers
+from hybrid_rt_bench.kinds.peers import run as peers_run
+from hybrid_rt_bench.kinds.peers.cell import Contender
+from hybrid_rt_bench.kinds.peers.columns import SCHEMA, TIMES
+from hybrid_rt_bench.kinds.peers.programs.base import (
+    Answers,
+    Opened,
+    Peer,
+    PeerError,
+    Picture,
+    Query,
+    View,
+)
+from hybrid_rt_bench.kinds.peers.programs.ours import Embree
+from hybrid_rt_bench.results import folder as results
+from hybrid_rt_bench.runs import read_run, render_run
 from hybrid_rt_scenes import get_scene
+from support.bench_rows import ENVIRONMENT
 
 TEXT = """
 schema = 1
@@ -154,7 +168,7 @@ def test_a_peer_that_cannot_be_imported_has_a_row_with_the_reason(monkeypatch, t
     assert "No module named 'no_such_ray_tracer'" in text
     assert (folder / "figures" / "rays-by-program.png").stat().st_size > 5000
     (folder / "tables.md").unlink()
-    render_run(results.load_run(folder))
+    render_run(read_run(folder))
     assert (folder / "tables.md").read_text() == text
 
 
@@ -407,18 +421,15 @@ def write_run(out):
             {"name": "quick", "version": "quick 2", "detail": "so", "description": "theirs"},
         ],
     }  # fmt: skip
-    writer = results.create_run(out, "peers", meta)
-    writer.meta["environment"] = {
-        "cpu": "a CPU", "threads": 2, "os": "an OS", "embree": {"version": "4"},
-        "packages": {"numba": "0"}, "git": None,
-    }  # fmt: skip
+    writer = results.create_run(out, "peers", SCHEMA, meta)
+    writer.meta["environment"] = ENVIRONMENT
     absent = Contender(fake_peer(name="absent"), None, "ImportError: libgone.so: no such file")
     drawing = Contender(fake_peer(name="pipe", raster=True), Opened())
     for scene in ("hall", "yard"):
         rows, samples = [], []
         for workload, rays in (("mirror", 1000), ("primary", 2000)):
             for name, ms in (("embree", 10.0), ("quick", 5.0)):
-                timing = dict.fromkeys(results.PEER_TIMES, 1.5)
+                timing = dict.fromkeys((column.name for column in TIMES), 1.5)
                 timing |= {"ms": ms, "ms_low": ms, "ms_high": ms}
                 opened = Opened()
                 opened.build_seconds, opened.threads = 0.5, 2
@@ -437,7 +448,7 @@ def write_run(out):
                         }
                     )  # fmt: skip
             rows.append(absent.row(workload))
-        timing = dict.fromkeys(results.PEER_TIMES, 1.5) | {"ms": 20.0}
+        timing = dict.fromkeys((column.name for column in TIMES), 1.5) | {"ms": 20.0}
         rows.append(
             drawing.row(
                 "raster", rays=1000, read_ms=3.0, first_ms=40.0, same=0.999, different=1,
@@ -452,7 +463,7 @@ def write_run(out):
 
 
 def test_the_report_is_made_of_the_files_alone(tmp_path):
-    run = results.load_run(write_run(tmp_path))
+    run = read_run(write_run(tmp_path))
     tables, written = render_run(run)
     by_title = {table.title: table for table in tables}
     traced = by_title["The same rays through other programs"]
@@ -474,7 +485,7 @@ def test_the_report_is_made_of_the_files_alone(tmp_path):
 
 
 def test_the_figure_has_a_panel_a_scene_and_says_what_did_not_run(tmp_path):
-    figure = peers_report.rates(results.load_run(write_run(tmp_path)))
+    figure = peers_figures.rates(read_run(write_run(tmp_path)))
     assert [ax.get_title() for ax in figure.axes] == [
         "hall (1046 triangles)", "yard (1046 triangles)"
     ]  # fmt: skip

@@ -11,13 +11,19 @@ import pytest
 import hybrid_rt as hrt
 from hybrid_rt.kernels.simd import WIDTH
 from hybrid_rt.kernels.techniques.certified import slots
-from hybrid_rt_bench import cli, rates, results, roofline, roofline_cell, roofline_run
-from hybrid_rt_bench import rates_kernels as kernels
-from hybrid_rt_bench.measure import prepare
-from hybrid_rt_bench.report import render_run
-from hybrid_rt_bench.report import roofline as report
-from hybrid_rt_bench.spec import load_experiment, parse_experiment
+from hybrid_rt_bench import cli
+from hybrid_rt_bench.cli import terminal
+from hybrid_rt_bench.experiments import load_experiment, parse_experiment
+from hybrid_rt_bench.kinds.roofline import cell as roofline_cell
+from hybrid_rt_bench.kinds.roofline import kernels, rates
+from hybrid_rt_bench.kinds.roofline import reckon as roofline
+from hybrid_rt_bench.kinds.roofline import tables as report
+from hybrid_rt_bench.kinds.roofline.columns import SCHEMA
+from hybrid_rt_bench.measure.loaded import prepare
+from hybrid_rt_bench.results import folder as results
+from hybrid_rt_bench.runs import read_run, render_run
 from hybrid_rt_scenes import get_scene
+from support.bench_rows import ENVIRONMENT
 
 TEXT = """
 schema = 1
@@ -187,19 +193,19 @@ def record():
 
 def test_a_view_has_its_work_and_its_sizes(record):
     scene, camera, found = record
-    gbuffer = hrt.rasterize(scene, camera, lists=4)
-    pyramid = hrt.build_depth_pyramid(gbuffer, conservative=True)
-    marched = hrt.march(hrt.mirror_rays(gbuffer), gbuffer, pyramid, "certified", threads=1)
+    gbuffer = hrt.rasterize(scene, camera)
+    screen = hrt.prepare(gbuffer, hrt.Certified(lists=4))
+    marched = hrt.march(hrt.mirror_rays(gbuffer), screen, threads=1)
     (row,) = found.results
     assert {k: row[k] for k in dataclasses.asdict(marched.work)} == dataclasses.asdict(marched.work)
     assert row["alpha"] == marched.resolved.mean()
     assert row["pyramid_gathered"] == marched.steps.sum()
     assert row["corners_gathered"] == 9 * marched.tests
     assert row["planes_places"] == marched.work.planes
-    assert row["planes_bytes"] + row["lists_bytes"] == gbuffer.lists.nbytes
+    assert row["planes_bytes"] + row["lists_bytes"] == screen.data.lists.nbytes
     assert row["corners_bytes"] == 36 * len(scene)
     assert row["slots_bytes"] == slots.STRIDE * 192
-    assert row["pyramid_bytes"] < pyramid.data.nbytes
+    assert row["pyramid_bytes"] < screen.data.pyramid.nbytes
     gathered = sum(row[f"{name}_gathered"] for name in roofline.STRUCTURES)
     assert row["touched_bytes"] == 4 * gathered + (32 + 26) * len(marched)
 
@@ -242,12 +248,14 @@ def test_a_run_is_kept_and_shown_again(monkeypatch, tmp_path, capsys):
     assert list(found.threads) == [1]
     meta = json.loads((folder / "run.json").read_text())
     assert {row["bytes"] for row in meta["rates"]} == {16384, 65536}
-    assert set(meta["compile_seconds"]) == {"march", "rates"}
+    assert set(meta["compile_seconds"]) == {
+        "raster, march and Embree", "rates of the machine"
+    }  # fmt: skip
     text = (folder / "tables.md").read_text()
     for figure in ("gather-rate", "march-budget"):
         assert (folder / "figures" / f"{figure}.png").stat().st_size > 5000
     (folder / "tables.md").unlink()
-    render_run(results.load_run(folder))
+    render_run(read_run(folder))
     assert (folder / "tables.md").read_text() == text
 
 
@@ -259,9 +267,9 @@ def test_a_view_that_fails_costs_only_itself(monkeypatch, tmp_path, capsys):
             raise RuntimeError("out of luck")
         return real(base, camera, name, *others)
 
-    monkeypatch.setattr(roofline_run.roofline_cell, "measure_cell", fails)
+    monkeypatch.setattr(roofline_cell, "measure_cell", fails)
     code, folder = run(monkeypatch, tmp_path, "--threads", "1", "--quick")
-    assert code == cli.FAILED
+    assert code == terminal.FAILED
     assert "RuntimeError: out of luck" in capsys.readouterr().err
     (cell,) = json.loads((folder / "run.json").read_text())["cells"]
     assert cell["state"] == "failed"
@@ -273,7 +281,7 @@ def test_an_option_of_another_kind_is_refused(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(sys, "argv", ["hybrid-rt", "run", str(path), "--triangles", "64"])
     with pytest.raises(SystemExit) as stopped:
         cli.main()
-    assert stopped.value.code == cli.USAGE
+    assert stopped.value.code == terminal.USAGE
     assert "--triangles" in capsys.readouterr().err
 
 
@@ -282,6 +290,7 @@ def write_run(out, record):
     writer = results.create_run(
         out,
         "roofline",
+        SCHEMA,
         {
             "kind": "roofline", "command": [], "notes": [], "warnings": [], "rates": RATES,
             "spec": {"title": "Roofline", "rounds": 2, "repeats": 2},
@@ -289,10 +298,7 @@ def write_run(out, record):
             "caches": [{"name": "L1", "bytes": 32768}],
         },
     )  # fmt: skip
-    writer.meta["environment"] = {
-        "cpu": "a CPU", "threads": 2, "os": "an OS", "embree": {"version": "4"},
-        "packages": {"numba": "0"}, "git": None,
-    }  # fmt: skip
+    writer.meta["environment"] = ENVIRONMENT
     (row,) = record[2].results
     one = {"march_ns": 300.0, "start_ns": 40.0, "embree_ns": 250.0, "budget_ns": 100.0}
     two = {**one, "budget_ns": -5.0}
@@ -300,7 +306,7 @@ def write_run(out, record):
     rows = [{**row, "threads": 1, **one}, {**row, "threads": 2, **two}]
     writer.add_cell(cell, record[2].samples, rows, [])
     writer.finish()
-    return results.load_run(writer.folder)
+    return read_run(writer.folder)
 
 
 def test_the_report_is_made_of_the_files_alone(tmp_path, record):

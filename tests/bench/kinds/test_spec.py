@@ -1,16 +1,9 @@
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt_bench.kinds import RUNNERS
-from hybrid_rt_bench.report.render import FORMS
-from hybrid_rt_bench.spec import (
-    KINDS,
-    Resolution,
-    experiment_names,
-    load_experiment,
-    parse_experiment,
-)
-from hybrid_rt_bench.techniques import get_technique
+from hybrid_rt_bench.experiments import experiment_names, load_experiment, parse_experiment
+from hybrid_rt_bench.measure.experiment import Resolution
+from hybrid_rt_bench.registry import kinds
 
 GOOD = """
 schema = 1
@@ -36,7 +29,7 @@ def test_every_experiment_of_the_package_is_whole(name, quick):
     if experiment.kind == "paper":
         assert experiment.picture in experiment.resolutions
     for technique in getattr(experiment, "techniques", None) or []:
-        get_technique(technique)
+        assert technique in hrt.TECHNIQUES
 
 
 def test_the_paper_is_measured_at_its_own_resolutions_and_scenes():
@@ -54,10 +47,18 @@ def test_quick_lays_its_table_over_the_rest():
     assert full.scenes == quick.scenes
 
 
-def test_every_kind_has_a_class_a_runner_and_a_form():
-    assert set(KINDS) == set(RUNNERS) == set(FORMS)
-    for kind, model in KINDS.items():
-        assert model.model_fields["kind"].default == kind
+@pytest.mark.parametrize("name", kinds.names())
+def test_every_part_of_a_kind_is_found(name):
+    kind = kinds[name]
+    assert kind.spec_class().model_fields["kind"].default == name
+    assert kind.columns().key_names
+    parts = [kind.runner(), kind.table_maker(), *kind.figure_makers(), kind.comparer()]
+    assert all(callable(part) for part in parts if part is not None)
+    assert kind.experiments()
+    assert all(column.meaning for columns in kind.columns().tables.values()
+               for column in columns.values())  # fmt: skip
+    changes = {option.parameter for option in kind.options if option.changes}
+    assert changes <= {"resolutions", "rounds", "techniques"}
 
 
 def test_an_unknown_kind_is_answered_with_the_nearest():
@@ -111,3 +112,47 @@ def test_resolution_refuses(text):
 
 def test_resolution_reads_what_it_writes():
     assert str(Resolution.parse("--size", " 1920X1080 ")) == "1920x1080"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("[quick]\nrounds = 1", "", "quick: expected a table, got 3"),
+        ('name = "x"', 'name = "x"\nkind = ["paper"]', "kind: expected the name of a kind"),
+        ('name = "x"', 'name = "a\\u0000b"', "name: expected"),
+        ('name = "x"', 'name = "../x"', "name: expected"),
+        ('name = "x"', 'name = ""', "name: expected"),
+        ('title = "X"', 'title = "X\\nY"', "title: expected"),
+        ('name = "sphere"', 'name = "sph\\u0000ere"', "scenes.0.name: expected"),
+        ("rounds = 3", "rounds = 1e20", "rounds: expected"),
+        ("rounds = 3", "rounds = 100000000000000000000", "rounds: expected"),
+        ("rounds = 3", "rounds = true", "rounds: expected"),
+        ("rounds = 3", "rounds = nan", "rounds: expected"),
+        ("rounds = 3", "rounds = 3\nwarmup = 1e9", "warmup: expected"),
+        ("rounds = 3", "rounds = 3\nselection_rays = 1e30", "selection_rays: expected"),
+        ("[[scenes]]", "scenes = " + "[" * 5000 + "]" * 5000 + "\n[[other]]", "expected"),
+        ("rounds = 1\n", 'rounds = 1\nkind = "error"\n', "quick.kind: expected 'paper'"),
+    ],
+)
+def test_junk_is_refused_by_name(old, new, said):
+    text = GOOD.replace(old, new)
+    if not new:
+        text = "quick = 3\n" + text
+    with pytest.raises(hrt.HybridRTError, match=said):
+        parse_experiment(text, source="x.toml")
+
+
+@pytest.mark.parametrize("name", ["a\0b.toml", "x/" * 3000 + "y.toml", "/", "/dev/null/x.toml"])
+def test_a_path_that_cannot_be_one_is_refused(name):
+    with pytest.raises(hrt.ArgumentError, match="experiment"):
+        load_experiment(name)
+
+
+def test_a_file_that_is_no_text_or_too_long_is_refused(tmp_path):
+    path = tmp_path / "x.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(hrt.ArgumentError, match="readable TOML"):
+        load_experiment(str(path))
+    path.write_bytes(b"#" * 2**21)
+    with pytest.raises(hrt.ArgumentError, match="at most"):
+        load_experiment(str(path))

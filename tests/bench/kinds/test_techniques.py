@@ -1,77 +1,43 @@
-"""The registry of techniques."""
-
-import dataclasses
+"""The points of techniques, as judging kinds measure them."""
 
 import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt.techniques import modes
-from hybrid_rt_bench.techniques import TECHNIQUES, get_technique
+from hybrid_rt_bench.measure.screens import Screens, points_of
 from support import synthetic
 
 
-def box(size):
-    return hrt.Scene.from_arrays(size * np.eye(3), [[0, 1, 2]])
-
-
-def test_every_mode_is_a_technique_under_its_own_name():
-    for name, technique in TECHNIQUES.items():
-        assert technique.name == name
-        assert technique.mode == modes.named(name)
-        assert technique.description
-        assert technique.reference
-
-
-@pytest.mark.parametrize("technique", TECHNIQUES.values(), ids=TECHNIQUES)
-def test_points_are_of_one_kind_and_told_apart(technique):
-    points = technique.points(box(1.0))
-    labels = [label for label, _ in points]
+@pytest.mark.parametrize("technique", hrt.TECHNIQUES.values(), ids=hrt.TECHNIQUES)
+@pytest.mark.parametrize("which", ["all", "default", "switches", "cheapest"])
+def test_points_are_told_apart_and_the_default_is_one(technique, which):
+    points = points_of(technique, which)
+    labels = [point.label for point in points]
     assert len(set(labels)) == len(labels)
     assert max(map(len, labels)) <= 60
-    assert all(type(mode) is type(technique.mode) for _, mode in points)
-    assert len({mode for _, mode in points}) == len(points)
+    assert all(point.name == technique.name for point in points)
+    assert sum(point.default for point in points) == 1
 
 
-@pytest.mark.parametrize("technique", TECHNIQUES.values(), ids=TECHNIQUES)
-def test_the_default_is_one_of_the_points(technique):
-    scene = box(2.0)
-    default = technique.mode
-    if hasattr(default, "thickness"):
-        default = dataclasses.replace(default, thickness=default.thickness_in(scene))
-    assert default in [mode for _, mode in technique.points(scene)]
+def test_a_grid_without_the_default_gets_it():
+    class Bare(hrt.Paper):
+        name = "bare"
+
+        @classmethod
+        def _grid(cls, which):
+            return [hrt.Point("samples 2", cls(samples=2))]
+
+    assert [point.label for point in points_of(Bare, "all")] == ["default", "samples 2"]
 
 
-@pytest.mark.parametrize("name", ["linear", "dda", "hiz"])
-def test_thicknesses_follow_the_scene(name):
-    small, large = (get_technique(name).points(box(size)) for size in (1.0, 100.0))
-    for (label, a), (same, b) in zip(small, large, strict=True):
-        assert label == same
-        assert b.thickness == pytest.approx(100 * a.thickness)
-        assert dataclasses.replace(a, thickness=1.0) == dataclasses.replace(b, thickness=1.0)
-    share = dict(small)[next(label for label, _ in small if label.startswith("thickness 0.5 %"))]
-    assert share.thickness == pytest.approx(0.005 * np.sqrt(3))
-
-
-def test_every_point_marches():
+def test_every_point_marches_and_shares_what_it_reads():
     rng = np.random.default_rng(3)
     buffer = synthetic.random_gbuffer(rng, 30, 20)
     rays = synthetic.random_rays(rng, buffer, 100)
-    pyramid = hrt.build_depth_pyramid(buffer)
-    for technique in TECHNIQUES.values():
-        for _, mode in technique.points(buffer.scene):
-            assert len(hrt.march(rays, buffer, pyramid, mode)) == 100
-
-
-def test_parameters_in_words():
-    assert get_technique("paper").parameters == {"samples": "4", "max_steps": "no limit"}
-    words = get_technique("hiz").parameters
-    assert words["thickness"] == "0.5 %"
-    assert words["exhausted_hits"] == "yes"
-    assert words["trace_background"] == "no"
-    assert words["max_steps"] == "32"
-
-
-def test_unknown_technique_is_answered_with_the_nearest():
-    with pytest.raises(hrt.UnknownNameError, match="did you mean 'linear'"):
-        get_technique("liner")
+    screens = Screens(buffer, 1)
+    for technique in hrt.TECHNIQUES.values():
+        for point in points_of(technique, "all"):
+            screen = screens.of(point.technique)
+            assert screen.technique == point.technique
+            assert screens.of(point.technique).data is screen.data
+            assert len(hrt.march(rays, screen)) == 100

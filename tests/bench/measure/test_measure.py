@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt_bench import env, plan, primary, shade, strongest
-from hybrid_rt_bench.spec import load_experiment
+from hybrid_rt_bench.experiments import load_experiment
+from hybrid_rt_bench.measure import environment as env
+from hybrid_rt_bench.measure import plan, primary, shade, strongest
 
 PAPER = load_experiment("paper")
 

@@ -11,7 +11,7 @@ FAULTS = """
 import resource, sys
 import numpy as np
 sys.path[:0] = {path!r}
-from hybrid_rt_bench import memory
+from hybrid_rt_bench.measure import memory
 print(memory.keep_freed() if {keep} else "left")
 def use():
     np.empty(1 << 25, np.uint8).fill(1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt_bench.workloads import OCCLUSION_REACH, WORKLOADS, get_workload
+from hybrid_rt_bench.measure.workloads import OCCLUSION_REACH, WORKLOADS, get_workload
 from hybrid_rt_scenes import SceneSpec, automatic_lights, get_scene, read_definition
 
 NAMES = [

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt_bench.workloads import WORKLOADS
+from hybrid_rt_bench.measure.workloads import WORKLOADS
 from hybrid_rt_scenes import get_scene, scene_names
 
 CLOSED = {"kitchen", "conference"}  # no sun comes in
@@ -49,12 +49,12 @@ def nave():
         pytest.skip(why)
     scene = spec.load()
     buffer = hrt.rasterize(scene, spec.camera("nave", 480, 270))
-    return spec, buffer, hrt.build_depth_pyramid(buffer), hrt.EmbreeTracer(scene)
+    return spec, buffer, hrt.prepare(buffer, "paper"), hrt.EmbreeTracer(scene)
 
 
 @pytest.mark.parametrize("name", WORKLOADS)
 def test_workloads_are_resolved_in_part_and_mostly_right(nave, name):
-    spec, buffer, pyramid, tracer = nave
+    spec, buffer, screen, tracer = nave
     workload = WORKLOADS[name]
     rays = workload.make(spec, buffer, 1)
     covered = (buffer.prim_id >= 0).sum()
@@ -63,12 +63,12 @@ def test_workloads_are_resolved_in_part_and_mostly_right(nave, name):
     # but for slivers seen edge-on, whose depth the raster clamps off their plane
     assert (tracer.intersect(rays).prim_id == own).mean() < 1e-4
     if workload.any_hit:
-        result = hrt.occluded_hybrid(rays, buffer, pyramid, tracer)
+        result = hrt.occluded_hybrid(rays, screen, tracer)
         truth = tracer.occluded(rays)
         assert 0.02 < truth.mean() < 0.9
         wrong = result.occluded != truth
     else:
-        result = hrt.trace_hybrid(rays, buffer, pyramid, tracer)
+        result = hrt.trace_hybrid(rays, screen, tracer)
         truth = tracer.intersect(rays)
         assert (truth.prim_id >= 0).mean() > 0.8
         # off by more than a tenth of the way

@@ -8,11 +8,15 @@ import pytest
 from matplotlib.figure import Figure
 
 import hybrid_rt as hrt
-from hybrid_rt_bench import compare, results
-from hybrid_rt_bench.error_cell import PREPARED, _timing_columns
-from hybrid_rt_bench.pooling import CELL, VERDICTS
-from hybrid_rt_bench.report import error_maps, error_tables, pareto, render_run
-from hybrid_rt_bench.results import MAP_CLASSES
+from hybrid_rt_bench.judged import figures as pareto
+from hybrid_rt_bench.judged import maps as error_maps
+from hybrid_rt_bench.judged import tables as error_tables
+from hybrid_rt_bench.judged.cell import _timing_columns
+from hybrid_rt_bench.judged.columns import MAP_CLASSES, PREPARED, SCHEMA, VERDICTS
+from hybrid_rt_bench.kinds.error.tables import tables as kind_tables
+from hybrid_rt_bench.results import folder as results
+from hybrid_rt_bench.runs import compare_runs, read_run, render_run
+from support.bench_rows import ENVIRONMENT
 
 RAYS, ROUNDS = 10_000, 3
 # technique, point, default, answers, false hits, false misses, seconds of the hybrid
@@ -64,11 +68,8 @@ def write_run(out, *, scenes=("atrium", "street"), finish=True):
         "kind": "error", "command": [], "notes": [], "warnings": [], "scenes": [],
         "spec": {"title": "Speed against error"},
     }  # fmt: skip
-    writer = results.create_run(out, "error", meta, CELL)
-    writer.meta["environment"] = {
-        "cpu": "a CPU", "threads": 2, "os": "an OS", "embree": {"version": "4"},
-        "packages": {"numba": "0"}, "git": None, "threading_layer": "omp",
-    }  # fmt: skip
+    writer = results.create_run(out, "error", SCHEMA, meta)
+    writer.meta["environment"] = ENVIRONMENT
     for scene in scenes:
         for workload, size in (("mirror", 64), ("diffuse", 64), ("mirror", 128)):
             timed = size == 64
@@ -110,7 +111,7 @@ def write_run(out, *, scenes=("atrium", "street"), finish=True):
 
 @pytest.fixture
 def run(tmp_path):
-    return results.load_run(write_run(tmp_path))
+    return read_run(write_run(tmp_path))
 
 
 def row_of(table, first):
@@ -208,8 +209,8 @@ def test_report_writes_every_figure_from_the_files_alone(run):
 
 
 def test_an_unfinished_run_is_shown_as_far_as_it_went(tmp_path):
-    run = results.load_run(write_run(tmp_path, scenes=("atrium",), finish=False))
-    tables = error_tables.all_tables(run)
+    run = read_run(write_run(tmp_path, scenes=("atrium",), finish=False))
+    tables = kind_tables(run)
     assert len(tables) == 8
     assert all(table.rows for table in tables)
 
@@ -252,4 +253,4 @@ def test_map_colours_errors_and_keeps_them_when_reduced():
 
 def test_comparison_of_an_error_run_is_refused_with_a_reason(run):
     with pytest.raises(hrt.ArgumentError, match="kind 'error'"):
-        compare.compare(run, run)
+        compare_runs(run, run)

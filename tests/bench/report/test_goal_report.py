@@ -4,10 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hybrid_rt_bench import results
-from hybrid_rt_bench.error_cell import _timing_columns
-from hybrid_rt_bench.pooling import CELL, VERDICTS
-from hybrid_rt_bench.report import ablation, error_tables, goal, render_run
+from hybrid_rt_bench.judged.cell import _timing_columns
+from hybrid_rt_bench.judged.columns import SCHEMA, VERDICTS
+from hybrid_rt_bench.kinds.ablation import tables as ablation
+from hybrid_rt_bench.kinds.hybrid import tables as goal
+from hybrid_rt_bench.results import folder as results
+from hybrid_rt_bench.runs import read_run, render_run
+from support.bench_rows import ENVIRONMENT, whole
 
 ROUNDS = 3
 EMBREE = 1.0
@@ -39,23 +42,20 @@ def point_rows(technique, point, default, rays, alpha, wrong, march):
     return {**row, **_timing_columns(row, samples)}, samples
 
 
-def write_run(out, points, cells):
+def write_run(out, kind, cells):
     """Write a run; `cells` says scene, camera, width, rays and a factor on the march's time."""
     meta = {
-        "kind": "error", "command": [], "notes": [], "warnings": [],
+        "kind": kind, "command": [], "notes": [], "warnings": [],
         "scenes": [{"name": "hall", "triangles": 1234}],
-        "spec": {"title": "X", "workloads": [{"name": "mirror", "points": points}]},
+        "spec": {"title": "X", "rounds": ROUNDS},
     }  # fmt: skip
-    writer = results.create_run(out, "x", meta, CELL)
-    writer.meta["environment"] = {
-        "cpu": "a CPU", "threads": 2, "os": "an OS", "embree": {"version": "4"},
-        "packages": {"numba": "0"}, "git": None, "threading_layer": "omp",
-    }  # fmt: skip
+    writer = results.create_run(out, kind, SCHEMA, meta)
+    writer.meta["environment"] = ENVIRONMENT
     for scene, camera, width, rays, factor, measured in cells:
         rows, samples, verdicts = [], [], []
         for technique, point, default, alpha, wrong, march in measured:
             row, taken = point_rows(technique, point, default, rays, alpha, wrong, factor * march)
-            rows.append(row)
+            rows.append(whole(SCHEMA, "results", row))
             samples += taken
             names = {"technique": technique, "point": point}
             verdicts.append({**names, "status": "HIT", "verdict": "CORRECT", "count": rays})
@@ -63,7 +63,7 @@ def write_run(out, points, cells):
         cell |= {"workload": "mirror", "seed": 0, "rays": rays, "timed": True}
         writer.add_cell(cell, samples, rows, verdicts)
     writer.finish()
-    return results.load_run(writer.folder)
+    return read_run(writer.folder)
 
 
 SWITCHES = (
@@ -93,7 +93,7 @@ def switches(tmp_path):
         ("hall", "b", 64, 30_000, 1.0, SWITCHES),
         ("yard", "a", 64, 10_000, 2.0, SWITCHES),
     ]
-    return write_run(tmp_path, "switches", cells)
+    return write_run(tmp_path, "ablation", cells)
 
 
 @pytest.fixture
@@ -104,7 +104,7 @@ def hybrid(tmp_path):
         ("hall", "a", 128, 40_000, 1.0, CERTIFIED),
         ("hall", "b", 128, 40_000, 1.0, CERTIFIED),
     ]
-    return write_run(tmp_path, "cheapest", cells)
+    return write_run(tmp_path, "hybrid", cells)
 
 
 def test_each_switch_is_shown_against_the_base(switches):
@@ -144,9 +144,7 @@ def test_a_march_that_leaves_embree_more_than_all_may_cost_nothing(switches):
     assert float(row_of(whole, "base")["may cost, ns a ray"]) < 0
 
 
-def test_only_an_ablation_has_the_table_of_switches(switches, hybrid):
-    assert goal.tables(switches) == []
-    assert ablation.tables(hybrid) == []
+def test_each_kind_has_its_own_tables(switches, hybrid):
     for run, title in ((switches, "part of the certified march"), (hybrid, "strongest Embree")):
         tables, written = render_run(run)
         assert title in tables[0].title
@@ -204,9 +202,3 @@ def test_the_fastest_that_is_nearly_right_is_found_by_what_was_counted(hybrid):
     only = results.RunData(hybrid.folder, hybrid.meta, hybrid.samples, none, hybrid.verdicts)
     (table,) = goal.table_nearly_right(only)
     assert row_of(table, "hall")["technique"] == "none"
-
-
-def test_the_usual_tables_are_of_runs_that_ask_for_neither(tmp_path):
-    run = write_run(tmp_path, "all", [("hall", "a", 64, 10_000, 1.0, SWITCHES)])
-    assert ablation.tables(run) == goal.tables(run) == []
-    assert error_tables.all_tables(run)[0].title == "Speed against error"

@@ -8,10 +8,18 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt_bench import compare, results, stats, summary
-from hybrid_rt_bench.report import all_tables, render_run
+from hybrid_rt_bench.experiments import load_experiment
+from hybrid_rt_bench.kinds.paper import compare, summary
+from hybrid_rt_bench.kinds.paper.columns import SCHEMA
+from hybrid_rt_bench.kinds.paper.tables import tables as all_tables
 from hybrid_rt_bench.report.table import Table, number
-from hybrid_rt_bench.spec import load_experiment
+from hybrid_rt_bench.results import files
+from hybrid_rt_bench.results import folder as results
+from hybrid_rt_bench.results import statistics as stats
+from hybrid_rt_bench.results.files import ReportsError
+from hybrid_rt_bench.results.schema import HYBRID_STAGES
+from hybrid_rt_bench.runs import read_run, render_run
+from support.bench_rows import ENVIRONMENT, whole
 
 ALPHA, ROUNDS = 0.4, 5
 MILLISECONDS = {
@@ -26,6 +34,7 @@ def write_run(out, slower=1.0, cameras=("left", "right"), finish=True):
     writer = results.create_run(
         out,
         "paper",
+        SCHEMA,
         {
             "command": [],
             "spec": load_experiment("paper").model_dump(mode="json", by_alias=True),
@@ -36,10 +45,7 @@ def write_run(out, slower=1.0, cameras=("left", "right"), finish=True):
             ],
         },
     )
-    writer.meta["environment"] = {
-        "cpu": "a CPU", "threads": 2, "os": "an OS", "embree": {"version": "4"},
-        "packages": {"numba": "0"}, "git": None, "threading_layer": "omp",
-    }  # fmt: skip
+    writer.meta["environment"] = ENVIRONMENT
     for camera in cameras:
         for width, height in ((640, 360), (1280, 720)):
             pixels = width * height / (640 * 360)
@@ -49,7 +55,7 @@ def write_run(out, slower=1.0, cameras=("left", "right"), finish=True):
             }
             samples = [
                 {
-                    "technique": "paper" if stage in results.HYBRID_STAGES else "",
+                    "technique": "paper" if stage in HYBRID_STAGES else "",
                     "stage": stage,
                     "round": r,
                     "seconds": seconds,
@@ -92,7 +98,7 @@ def write_run(out, slower=1.0, cameras=("left", "right"), finish=True):
                     "classes_paper": classes,
                 }
             cell = {"scene": "atrium", "camera": camera, "width": width, "height": height}
-            writer.add_cell(cell, samples, [row], verdicts, picture)
+            writer.add_cell(cell, samples, [whole(SCHEMA, "results", row)], verdicts, picture)
     if finish:
         writer.finish()
     return writer.folder
@@ -100,7 +106,7 @@ def write_run(out, slower=1.0, cameras=("left", "right"), finish=True):
 
 @pytest.fixture
 def run(tmp_path):
-    return results.load_run(write_run(tmp_path))
+    return read_run(write_run(tmp_path))
 
 
 def cells_of(table, first):
@@ -117,7 +123,7 @@ def test_a_written_run_is_read_again(run):
 
 
 def test_a_run_without_end_is_readable_cell_by_cell(tmp_path):
-    run = results.load_run(write_run(tmp_path, finish=False))
+    run = read_run(write_run(tmp_path, finish=False))
     assert not run.meta["finished"]
     assert len(run.results) == 4
 
@@ -174,7 +180,7 @@ def test_report_writes_tables_and_every_figure_and_nothing_else(run):
 
 
 def test_interrupted_run_says_so_in_its_tables(tmp_path):
-    run = results.load_run(write_run(tmp_path, finish=False))
+    run = read_run(write_run(tmp_path, finish=False))
     render_run(run)
     assert "not finished" in (run.folder / "tables.md").read_text()
 
@@ -182,7 +188,7 @@ def test_interrupted_run_says_so_in_its_tables(tmp_path):
 def test_unknown_run_is_answered_with_the_nearest(run):
     name = run.name[:-1] + "X"
     with pytest.raises(hrt.UnknownNameError, match=f"did you mean '{run.name}'"):
-        results.load_run(name, run.folder.parent)
+        read_run(name, run.folder.parent)
 
 
 @pytest.mark.parametrize(
@@ -191,43 +197,45 @@ def test_unknown_run_is_answered_with_the_nearest(run):
         ("{", "not a readable run"),
         ("{}", "not a readable run"),
         (json.dumps({"schema_version": 99}), "schema version 99"),
-        (json.dumps({"schema_version": results.SCHEMA_VERSION}), "no cell was finished"),
+        (json.dumps({"schema_version": results.SCHEMA_VERSION}), "no list of 'cells'"),
+        (json.dumps({"schema_version": results.SCHEMA_VERSION, "cells": []}), "no cell was"),
+        ("[]", "no object"),
     ],
 )
 def test_damaged_run_is_refused(tmp_path, content, said):
     (tmp_path / "run.json").write_text(content)
-    with pytest.raises(results.ReportsError, match=said):
-        results.load_run(tmp_path)
+    with pytest.raises(ReportsError, match=said):
+        read_run(tmp_path)
 
 
 def test_full_disk_leaves_the_last_whole_file(tmp_path, monkeypatch):
     path = tmp_path / "x"
-    results.write_bytes(path, b"whole")
+    files.write_bytes(path, b"whole")
 
     def full(*_):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "replace", full)
-    with pytest.raises(results.ReportsError, match=r"x: cannot be written \(No space left"):
-        results.write_bytes(path, b"broken")
+    with pytest.raises(ReportsError, match=r"x: cannot be written \(No space left"):
+        files.write_bytes(path, b"broken")
     assert path.read_bytes() == b"whole"
     assert [p.name for p in tmp_path.iterdir()] == ["x"]
 
 
 def test_two_runs_of_one_second_get_two_folders(tmp_path):
-    folders = {results.create_run(tmp_path, "paper", {}).folder for _ in range(3)}
+    folders = {results.create_run(tmp_path, "paper", SCHEMA, {}).folder for _ in range(3)}
     assert len(folders) == 3
 
 
 def test_comparison_finds_the_ratio_and_the_cells_in_common(tmp_path):
-    a = results.load_run(write_run(tmp_path))
-    b = results.load_run(write_run(tmp_path, slower=1.5, cameras=("left",)))
+    a = read_run(write_run(tmp_path))
+    b = read_run(write_run(tmp_path, slower=1.5, cameras=("left",)))
     found = compare.compare(a, b)
     assert len(found.cells) == 2
     assert found.stages["march"].value == pytest.approx(1.5)
     assert found.stages["march"].low > 1.4
     assert any("2 cells" in text for text in found.warnings)
-    overall = compare.tables(found, a, b)[0]
+    overall = compare.shown(found, a, b)[0]
     assert "slower" in cells_of(overall, "march")[1]
 
 
@@ -237,8 +245,8 @@ def test_comparison_with_itself_shows_no_difference(run):
 
 
 def test_comparison_without_a_common_cell_is_refused(tmp_path):
-    a = results.load_run(write_run(tmp_path, cameras=("left",)))
-    b = results.load_run(write_run(tmp_path, cameras=("right",)))
+    a = read_run(write_run(tmp_path, cameras=("left",)))
+    b = read_run(write_run(tmp_path, cameras=("right",)))
     with pytest.raises(hrt.ArgumentError, match="none in common"):
         compare.compare(a, b)
 

@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hybrid_rt_bench.pooling import CELL, POINT, WRONG, pareto, pools
+from hybrid_rt_bench.judged.columns import CELL, POINT, WRONG
+from hybrid_rt_bench.judged.pooling import pareto, pools
 
 KEYS = [*CELL, *POINT]
 

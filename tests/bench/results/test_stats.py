@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from hybrid_rt_bench import stats
+from hybrid_rt_bench.results import statistics as stats
 
 
 def test_median_interval_is_made_of_the_order_statistics_that_cover():

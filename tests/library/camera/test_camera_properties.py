@@ -87,7 +87,7 @@ def test_a_view_is_not_widened_by(factor):
         ({"width": 0}, "width: expected an integer >= 1 and <= 32768, got 0"),
         ({"height": -5}, "height: "),
         ({"height": 2.5}, "height: "),
-        ({"vfov_deg": 180}, "vfov_deg: expected a finite number > 0 and < 180, got 180"),
+        ({"vfov_deg": 180}, "vfov_deg: expected a finite number > 1e-30 and < 180, got 180"),
         ({"vfov_deg": "60"}, "vfov_deg: "),
     ],
 )

@@ -92,8 +92,7 @@ def test_rows_of_resolved_rays_are_written_and_no_others(case, n, share):
     rows = [np.full(n, -7, t) for t in (np.float32, np.int32, np.float32, np.float32)]
     rows.append(np.full((n, 3), -7, np.float32))
     answer_hits(
-        2, resolved, rays.origin, rays.direction, prim, distance, scene.vertices, scene.faces,
-        *rows,
+        resolved, rays.origin, rays.direction, prim, distance, scene.vertices, scene.faces, *rows
     )  # fmt: skip
     for got, expected in zip(rows, answered(resolved, rays, prim, distance, scene), strict=True):
         np.testing.assert_allclose(got, expected, rtol=2e-6, atol=1e-6)

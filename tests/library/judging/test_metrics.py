@@ -306,7 +306,7 @@ def test_no_rays_are_judged_without_complaint(scene):
     [
         ({"resolved": np.ones(3, bool)}, "resolved"),
         ({"resolved": np.ones(2)}, "resolved"),
-        ({"claimed": hits_of((0, 1.0))}, "claimed"),
+        ({"claimed": hits_of((0, 1.0))}, "claimed.t"),
         ({"reference": hits_of((0, 1.0), (7, 1.0))}, "reference.prim_id"),
         ({"pixel": np.zeros((1, 2), np.int32)}, "pixel"),
         ({"pixel_tolerance": 0.0}, "pixel_tolerance"),

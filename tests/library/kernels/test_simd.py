@@ -766,8 +766,8 @@ def test_products_and_sums_are_not_contracted():
 PROGRAM = """
 import sys
 import numpy as np
-from numba import prange
 from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
+from hybrid_rt.kernels._queue import part
 from hybrid_rt.kernels.simd import *
 
 @inlined
@@ -782,8 +782,8 @@ def saxpy(a, x, y, out):
         store_masked(out, i, v, live)
 
 @parallel_kernel
-def collatz(start, steps):
-    for chunk in prange((start.size + 63) // 64):
+def collatz(share, start, steps):
+    for chunk in part(share, (start.size + 63) // 64):
         for i in range(chunk * 64, min(start.size, chunk * 64 + 64), WIDTH):
             live = first(start.size - i)
             n = load_masked(start, i, live, 1)
@@ -812,6 +812,7 @@ print(WIDTH, *hits)
 """
 
 
+@pytest.mark.slow
 def test_code_cached_for_one_machine_serves_it_again_and_no_other(tmp_path):
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
@@ -834,6 +835,7 @@ def test_code_cached_for_one_machine_serves_it_again_and_no_other(tmp_path):
         assert run(dict(os.environ)) == [WIDTH, 1, 1]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif("HYBRID_RT_TEST_WIDTH" in os.environ, reason="this is the other machine")
 @pytest.mark.parametrize("name", MACHINES)
 def test_all_of_this_on_another_machine(name):

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 import hybrid_rt as hrt
-from hybrid_rt.kernels.triangle import approach, frame, intersect
+from hybrid_rt.kernels import triangle as kernels
 from naive import triangle as naive
+from support.compiled import from_python
+
+approach, frame, intersect = map(from_python, (kernels.approach, kernels.frame, kernels.intersect))
 
 
 def length(vector):

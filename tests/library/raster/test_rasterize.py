@@ -307,6 +307,7 @@ def everywhere():
     return hrt.rasterize(scene, camera)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MACHINES)
 def test_the_same_on_another_machine(name, tmp_path):
     env, _ = machine(name)

@@ -345,8 +345,14 @@ def test_a_radius_below_the_error_of_the_origin_leaves_an_empty_interval(buffer)
     [
         (lambda g: hrt.glossy_rays(g, 1.5), r"roughness: expected a number from 0 to 1, got 1\.5"),
         (lambda g: hrt.glossy_rays(g, -0.1), "roughness: expected a number from 0 to 1"),
-        (lambda g: hrt.glossy_rays(g, math.nan), "roughness: expected a finite number, got nan"),
-        (lambda g: hrt.glossy_rays(g, "0.5"), "roughness: expected a finite number, got '0.5'"),
+        (
+            lambda g: hrt.glossy_rays(g, math.nan),
+            "roughness: expected a number from 0 to 1, got nan",
+        ),
+        (
+            lambda g: hrt.glossy_rays(g, "0.5"),
+            "roughness: expected a number from 0 to 1, got '0.5'",
+        ),
         (lambda g: hrt.glossy_rays(None, 0.5), "gbuffer: expected a GBuffer, got None"),
         (lambda g: hrt.diffuse_rays(g, -1), "seed: expected an integer >= 0"),
         (lambda g: hrt.diffuse_rays(g, 2**63), "seed: expected .* <= 9223372036854775807"),

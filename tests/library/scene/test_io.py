@@ -253,7 +253,7 @@ def test_what_the_mesh_itself_refuses_names_the_file_too(tmp_path):
     far = faces.copy()
     far[4, 1] = 99
     np.savez(tmp_path / "far.npz", vertices=vertices, faces=far)
-    bad(tmp_path / "far.npz", "faces", "(4, 1)")
+    bad(tmp_path / "far.npz", "faces", "at (4, 1), is 99")
     nan = vertices.copy()
     nan[2, 0] = np.nan
     np.savez(tmp_path / "nan.npz", vertices=nan, faces=faces)

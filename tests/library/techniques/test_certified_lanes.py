@@ -160,6 +160,7 @@ np.savez(sys.argv[1], width=WIDTH, **{name: getattr(marched, name) for name in F
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MACHINES)
 def test_the_same_on_another_machine(name, tmp_path):
     env, width = machine(name)

@@ -7,6 +7,7 @@ import pytest
 
 import hybrid_rt as hrt
 from hybrid_rt.kernels.techniques.certified import scalar as kernels
+from support.compiled import from_python
 from support.screens import lists_of, through
 
 S = hrt.MarchStatus
@@ -20,6 +21,8 @@ def kernel(request, monkeypatch):
 
 
 F = np.float32
+
+start_depth, depth_at = map(from_python, (kernels.start_depth, kernels.depth_at))
 
 
 def test_a_ray_that_float32_puts_into_the_next_row_meets_the_wires_of_its_own():
@@ -64,9 +67,9 @@ def test_the_depth_of_the_walk_is_never_nearer_than_the_ray():
         end = float(rng.uniform(0.5, 8000))
         s_end = end / scale
         dz = (far - depth) / s_end
-        z0, sz = kernels.start_depth(depth, dz, s_end), F(dz / scale)
+        z0, sz = start_depth(depth, dz, s_end), F(dz / scale)
         s = F(rng.uniform(0, end))
-        walked = kernels.depth_at(z0, sz, s)
+        walked = depth_at(z0, sz, s)
         true = Fraction(depth) + Fraction(dz) * Fraction(float(s)) / Fraction(scale)
         assert Fraction(float(walked)) <= true
         tight += true - Fraction(float(walked)) < Fraction(max(depth, far)) * 16 / 2**24

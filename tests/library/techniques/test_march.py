@@ -97,7 +97,7 @@ def test_every_way_to_end():
         (empty, (0, 0, 1), {"t_far": 1.0}, S.MISS),
         (wall(), (0, 0, -1), {"t_far": 1.0}, S.MISS),
         (wall(depth=0.09), (1, 0, 0), {}, S.HIDDEN),
-        (empty, (1, 0, 0), {"mode": hrt.Paper(max_steps=1)}, S.EXHAUSTED),
+        (empty, (1, 0, 0), {"technique": hrt.Paper(max_steps=1)}, S.EXHAUSTED),
         (empty, (0, 0, 0), {}, S.INVALID),
         (empty, (np.nan, 0, 1), {}, S.INVALID),
         (empty, (np.inf, 0, 1), {}, S.INVALID),

@@ -60,8 +60,8 @@ def test_the_default_thickness_is_a_share_of_the_scene():
     buffer = wall_in_a_row(2.0)
     diagonal = np.sqrt(3.0)  # of the triangle of unit vectors
     assert buffer.scene.diagonal == pytest.approx(diagonal)
-    for mode in (hrt.Linear(), hrt.PixelDDA(), hrt.HiZ()):
-        assert mode.thickness_in(buffer.scene) == pytest.approx(0.005 * diagonal)
+    for technique in (hrt.Linear, hrt.PixelDDA, hrt.HiZ):
+        assert technique().thickness == hrt.Share(0.005)
     edge = 2.0 + 0.005 * diagonal
     for z, status in ((edge - 1e-3, S.HIT), (edge + 1e-3, S.HIDDEN)):
         assert S(int(across(buffer, z, z, "dda").status[0])) is status

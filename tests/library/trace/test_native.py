@@ -120,10 +120,12 @@ rays = hrt.Rays.from_arrays(np.zeros((20, 3)), np.tile([(0.0, 0, -1)], (20, 1)))
 tracer = hrt.EmbreeTracer(scene)
 for width in (1, 4, 8, 16):
     assert (tracer.with_path(width=width).intersect(rays).prim_id == 0).all()
-print(len(kernels.intersect.signatures), sum(kernels.intersect.stats.cache_hits.values()))
+kernel = kernels.intersect.kernel
+print(len(kernel.signatures), sum(kernel.stats.cache_hits.values()))
 """
 
 
+@pytest.mark.slow
 @needs_packets
 def test_machine_code_is_compiled_once_and_serves_the_next_process(tmp_path):
     """Function addresses are arguments; as globals they would be of the first process."""

@@ -13,7 +13,9 @@ CAMERA = hrt.Camera.look_at((-10, 1.5, 0), (5, 3, 0), width=320, height=180)
 REASON = hrt.embree_problem()
 WAYS = [{"path": "run"}]
 if REASON is None:
-    WAYS += [{"path": "packet", "width": w, "coherent": c} for w in (1, 4, 8, 16) for c in (0, 1)]
+    WAYS += [
+        {"path": "packet", "width": w, "coherent": c} for w in (1, 4, 8, 16) for c in (False, True)
+    ]
     WAYS += [
         {"path": "packet", "width": w, "coherent": True, "order": "direction"} for w in (8, 16)
     ]

@@ -188,6 +188,12 @@ SPECIAL = {
     ("occluded_hybrid", "reference"): _ones,
     ("judge_occlusion", "claimed"): _ones,
     ("judge_occlusion", "reference"): _ones,
+    ("TRACERS.__getitem__", "name"): lambda: "brute",
+    ("TRACERS.check", "thing"): lambda: hrt.BruteForceTracer,
+    ("TRACERS.register", "thing"): lambda: hrt.BruteForceTracer,
+    ("Point", "technique"): hrt.Paper,
+    ("Screen.of", "technique"): hrt.Certified,
+    ("Rays.take", "index"): lambda: np.arange(3),
     ("Hits.put", "index"): lambda: np.arange(len(rays())),
     ("Hits.checked", "n"): lambda: len(rays()),
     ("Hits.checked", "faces"): lambda: len(scene()),
@@ -215,6 +221,10 @@ def _of_fields(cls: type) -> dict[str, Any] | None:
     return {f.name: getattr(whole, f.name) for f in dataclasses.fields(cls) if f.init}
 
 
+def _is_technique(thing: Any) -> bool:
+    return inspect.isclass(thing) and issubclass(thing, hrt.Technique)
+
+
 def arguments(label: str, function: Any) -> dict[str, Any]:
     """Return valid arguments for a callable, by parameter; defaults where there is no value."""
     if inspect.isclass(function) and (fields := _of_fields(function)) is not None:
@@ -224,6 +234,9 @@ def arguments(label: str, function: Any) -> dict[str, Any]:
         if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
             continue
         value = SPECIAL.get((label, parameter.name))
+        owner = getattr(hrt, label.partition(".")[0])
+        if parameter.name == "screen" and owner is not hrt.Technique and _is_technique(owner):
+            value = functools.partial(hrt.prepare, gbuffer(), owner())
         if value is None and parameter.default is parameter.empty:
             value = VALUES.get(parameter.name)
             if value is None:

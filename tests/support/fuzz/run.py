@@ -55,6 +55,11 @@ def calls() -> Iterator[Call]:
                 yield Call(target.label, parameter, label)
 
 
+def extremes(seeds: range) -> list[Call]:
+    """Return calls that try allowed but extreme scenes, views and rays, one for each seed."""
+    return [Call("extremes", "seed", str(seed)) for seed in seeds]
+
+
 def sample(everything: list[Call], share: float, seed: int) -> list[Call]:
     """Return a share of the calls, some of every argument."""
     rng = random.Random(seed)

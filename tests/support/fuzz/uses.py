@@ -61,6 +61,14 @@ def _mesh(mesh: hrt.Mesh) -> None:
     _scene(hrt.Scene.from_meshes([mesh]))
 
 
+def _judged(judged: hrt.Judged) -> None:
+    hrt.rates(judged)
+
+
+def _rate(rate: hrt.Rate) -> None:
+    float(rate.value)
+
+
 USES: dict[str, Callable[[Any], None]] = {
     "Scene": _scene,
     "Camera": _camera,
@@ -70,7 +78,9 @@ USES: dict[str, Callable[[Any], None]] = {
     "EmbreeTracer": _tracer,
     "BruteForceTracer": _tracer,
     "Hits": _hits,
+    "Judged": _judged,
     "Mesh": _mesh,
+    "Rate": _rate,
     "PointLight": _light,
     "AreaLight": _light,
     "DirectionalLight": _light,

@@ -14,11 +14,10 @@ have the same answers, ray for ray and step for step; there are the reasons and 
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
 from hybrid_rt.kernels import simd
-from hybrid_rt.kernels._jit import kernel, parallel_kernel
-from hybrid_rt.kernels._queue import fetch_add
+from hybrid_rt.kernels._jit import called, parallel_kernel
+from hybrid_rt.kernels._queue import take
 from hybrid_rt.kernels.techniques.certified.look import look, test
 from hybrid_rt.kernels.techniques.certified.setup import set_up
 from hybrid_rt.kernels.techniques.certified.slots import (
@@ -40,7 +39,7 @@ CHUNK = 1024
 GROUP = 16
 
 
-@kernel
+@called
 def walk(
     many, slots_f, slots_i, slots_d, ready, looks, tests, prim_id, nearest, rest, planes,
     shape, cells, bits, corners, max_steps, max_tests, any_hit, work,
@@ -65,7 +64,7 @@ def walk(
         n_looks = test(tests, n_tests, looks, slots_f, slots_i, slots_d, corners, any_hit, work)
 
 
-@kernel
+@called
 def march_some(
     order, many, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits, corners,
     max_steps, max_tests, any_hit, slots_f, slots_i, slots_d, ready, looks, tried, out, work,
@@ -96,7 +95,7 @@ def march_some(
 
 @parallel_kernel
 def march(
-    workers, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits, corners,
+    share, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits, corners,
     max_steps, max_tests, any_hit, probes, out, work,
 ):  # fmt: skip
     """March rays (N, 3); outputs (N,), work (workers, COUNTERS).
@@ -105,46 +104,44 @@ def march(
     resolved.
     """
     count = len(rays[2])
-    taken = np.zeros(1, np.int64)
-    for worker in prange(workers):
-        slots_f = np.zeros(F32_ROWS * STRIDE, np.float32)
-        slots_i = np.zeros(I32_ROWS * STRIDE, np.int32)
-        slots_d = np.zeros(F64_ROWS * STRIDE, np.float64)
-        ready = np.zeros(STRIDE, np.int32)
-        looks = np.zeros(STRIDE, np.int32)
-        tried = np.zeros(STRIDE, np.int32)
-        order = np.zeros(CHUNK + W, np.int32)
-        resolved = out[1]
-        apart = GROUP // probes
-        first = fetch_add(taken.ctypes.data, CHUNK)
-        while first < count:
-            last = min(count, first + CHUNK)
-            many = 0
-            for i in range(first + apart // 2, last, apart):
-                order[many] = i
-                many += 1
-            march_some(
-                order, many, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits,
-                corners, max_steps, max_tests, any_hit,
-                slots_f, slots_i, slots_d, ready, looks, tried, out, work[worker],
-            )  # fmt: skip
-            many = 0
-            for group in range(first, last, GROUP):
-                end = min(group + GROUP, last)
-                hopeful = group + apart // 2 >= end
-                for i in range(group + apart // 2, end, apart):
-                    hopeful |= resolved[i]
-                for i in range(group, end):
-                    if (i - group) % apart == apart // 2:
-                        continue
-                    if hopeful:
-                        order[many] = i
-                        many += 1
-                    else:
-                        unmarched(i, SKIPPED, F32(0.0), out)
-            march_some(
-                order, many, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits,
-                corners, max_steps, max_tests, any_hit,
-                slots_f, slots_i, slots_d, ready, looks, tried, out, work[worker],
-            )  # fmt: skip
-            first = fetch_add(taken.ctypes.data, CHUNK)
+    slots_f = np.zeros(F32_ROWS * STRIDE, np.float32)
+    slots_i = np.zeros(I32_ROWS * STRIDE, np.int32)
+    slots_d = np.zeros(F64_ROWS * STRIDE, np.float64)
+    ready = np.zeros(STRIDE, np.int32)
+    looks = np.zeros(STRIDE, np.int32)
+    tried = np.zeros(STRIDE, np.int32)
+    order = np.zeros(CHUNK + W, np.int32)
+    resolved = out[1]
+    apart = GROUP // probes
+    first = take(share, CHUNK)
+    while first < count:
+        last = min(count, first + CHUNK)
+        many = 0
+        for i in range(first + apart // 2, last, apart):
+            order[many] = i
+            many += 1
+        march_some(
+            order, many, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits,
+            corners, max_steps, max_tests, any_hit,
+            slots_f, slots_i, slots_d, ready, looks, tried, out, work[share.worker],
+        )  # fmt: skip
+        many = 0
+        for group in range(first, last, GROUP):
+            end = min(group + GROUP, last)
+            hopeful = group + apart // 2 >= end
+            for i in range(group + apart // 2, end, apart):
+                hopeful |= resolved[i]
+            for i in range(group, end):
+                if (i - group) % apart == apart // 2:
+                    continue
+                if hopeful:
+                    order[many] = i
+                    many += 1
+                else:
+                    unmarched(i, SKIPPED, F32(0.0), out)
+        march_some(
+            order, many, rays, size, box, prim_id, nearest, rest, planes, shape, cells, bits,
+            corners, max_steps, max_tests, any_hit,
+            slots_f, slots_i, slots_d, ready, looks, tried, out, work[share.worker],
+        )  # fmt: skip
+        first = take(share, CHUNK)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hybrid_rt.kernels import simd
-from hybrid_rt.kernels._jit import inlined, kernel
+from hybrid_rt.kernels._jit import called, inlined
 from hybrid_rt.kernels.raster.lists_planes import (
     DEPTH,
     ERROR,
@@ -136,7 +136,7 @@ def test_primitives(prim, m, corners, kz, ox, oy, oz, shear_x, shear_y, shear_z,
     return missed, hit, low, high
 
 
-@kernel
+@called
 def look(
     looks, n_looks, ready, n_ready, tests, slots_f, slots_i, prim_id, nearest, rest, planes, shape,
     max_tests, work,
@@ -228,7 +228,7 @@ def look(
     return n_ready, n_tests
 
 
-@kernel
+@called
 def test(tests, n_tests, looks, slots_f, slots_i, slots_d, corners, any_hit, work):
     """Intersect the rays of `tests` with their primitives; they go on to `looks` or end.
 

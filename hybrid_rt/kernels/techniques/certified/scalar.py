@@ -35,10 +35,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import prange
 
-from hybrid_rt.kernels._jit import inlined, kernel, parallel_kernel
-from hybrid_rt.kernels._queue import fetch_add
+from hybrid_rt.kernels._jit import called, inlined, parallel_kernel
+from hybrid_rt.kernels._queue import take
 from hybrid_rt.kernels.raster.lists_planes import (
     DEPTH,
     ERROR,
@@ -338,7 +337,7 @@ def walk(
     return status, -1, -1, -1, math.inf, s / scale, steps, tests
 
 
-@kernel
+@called
 def march_chunk(
     first, last, rays, box, lists, pyramid, scene, limits, out, steps_by_level, tests
 ):  # fmt: skip
@@ -385,19 +384,17 @@ def march_chunk(
 
 
 @parallel_kernel
-def march(workers, rays, box, lists, pyramid, scene, limits, out, steps_by_level, tests):
+def march(share, rays, box, lists, pyramid, scene, limits, out, steps_by_level, tests):
     """March rays; out (N,), steps_by_level (workers, L), tests (workers, 1).
 
     rays, lists, pyramid, scene, out: as in `hybrid_rt.kernels.arrays`; limits: (steps, tests, is
     any hit an answer).
     """
     n = len(rays.t_near)
-    taken = np.zeros(1, np.int64)
-    for worker in prange(workers):
-        first = fetch_add(taken.ctypes.data, CHUNK)
-        while first < n:
-            march_chunk(
-                first, min(n, first + CHUNK), rays, box, lists, pyramid, scene, limits, out,
-                steps_by_level[worker], tests[worker],
-            )  # fmt: skip
-            first = fetch_add(taken.ctypes.data, CHUNK)
+    first = take(share, CHUNK)
+    while first < n:
+        march_chunk(
+            first, min(n, first + CHUNK), rays, box, lists, pyramid, scene, limits, out,
+            steps_by_level[share.worker], tests[share.worker],
+        )  # fmt: skip
+        first = take(share, CHUNK)

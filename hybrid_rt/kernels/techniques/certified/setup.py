@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hybrid_rt.kernels import simd
-from hybrid_rt.kernels._jit import inlined, kernel
+from hybrid_rt.kernels._jit import called, inlined
 from hybrid_rt.kernels.techniques.certified.scalar import (
     BEYOND,
     DEPTH_ULPS,
@@ -92,7 +92,7 @@ def slope_of(delta):
     return simd.select(tiny, F32(0.0), slope), simd.select(tiny, F32(0.0), F32(1.0) / slope)
 
 
-@kernel
+@called
 def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_out, free_out):
     """Fill slots from `slot` on with the rays index (lanes) of `live` that can be walked.
 

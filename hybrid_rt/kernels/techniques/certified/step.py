@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hybrid_rt.kernels import simd
-from hybrid_rt.kernels._jit import kernel
+from hybrid_rt.kernels._jit import called
 from hybrid_rt.kernels.techniques.certified.slots import (
     ARRIVED,
     CODE,
@@ -46,7 +46,7 @@ FEW = 8
 """Lanes with which stepping goes on though other stages have work."""
 
 
-@kernel
+@called
 def step(
     ready, n_ready, looks, n_looks, more, slots_f, slots_i, shape, cells, bits, max_steps, work,
 ):  # fmt: skip

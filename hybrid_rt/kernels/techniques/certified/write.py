@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid_rt.kernels import simd
-from hybrid_rt.kernels._jit import inlined, kernel
+from hybrid_rt.kernels._jit import called, inlined
 from hybrid_rt.kernels.techniques.certified.scalar import (
     BEYOND,
 )
@@ -40,7 +40,7 @@ from hybrid_rt.kernels.techniques.screen import (
 )
 
 
-@kernel
+@called
 def write(many, slots_f, slots_i, slots_d, out):
     """Write the results of slots 0..many-1 to the rows of the outputs."""
     status, resolved, pixel, prim_id, t, t_free, steps = out

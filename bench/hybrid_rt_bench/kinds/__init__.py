@@ -1,0 +1,1 @@
+"""A folder a kind of experiment; each registers itself, and none knows another."""

@@ -1,0 +1,271 @@
+"""The tables of a run of kind "peers"."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from hybrid_rt_bench.report.table import Table, interval, number
+from hybrid_rt_bench.results import statistics as stats
+from hybrid_rt_bench.results.folder import RunData
+
+DASH = "–"
+RASTER = "raster"
+WHY = "not run, because"
+TRACED = ("mirror", "primary")
+"""The workloads of rays."""
+
+
+def tables(run: RunData) -> list[Table]:
+    """Return every table of the run, in the order of reading."""
+    made = [rays(run), pictures(run), agreement(run), views(run), programs(run)]
+    return [table for table in made if table.rows]
+
+
+def rays(run: RunData) -> Table:
+    """Return the rates of all peers, scene by scene, and how far they agree with robust Embree."""
+    table = Table(
+        "The same rays through other programs",
+        ["", "threads", "mirror, Mrays/s", "primary, Mrays/s", "time / strongest, mirror",
+         "cores busy", "same primitive, %", "largest error of t", "build, s", "peak memory, MiB",
+         WHY],
+    )  # fmt: skip
+    for scene, part in by_scene(traced(run)):
+        table.rows.append([scene_label(run, scene)])
+        for name, rows in _by_peer(part):
+            mirror = ok(rows[rows.workload == "mirror"])
+            every = ok(rows)
+            if every.empty:
+                table.rows.append([name, *[DASH] * (len(table.columns) - 2), _why(rows)])
+                continue
+            table.rows.append(
+                [
+                    name + (f" ({every.rays.sum():,} rays)" if every.sampled.any() else ""),
+                    f"{int(every.threads.iloc[0])}",
+                    number(rate(mirror)),
+                    number(rate(ok(rows[rows.workload == "primary"]))),
+                    _ratio(run, mirror),
+                    number(float(mirror.cores.mean()), 2) if len(mirror) else DASH,
+                    _share(_pooled(every, "same")),
+                    _power(float(every.t_max.max())),
+                    number(float(every.build_seconds.iloc[0])),
+                    number(float(every.peak_mib.iloc[0])),
+                    _why(rows),
+                ]
+            )
+    rounds, threads = run.meta["spec"]["rounds"], run.meta["environment"]["threads"]
+    table.notes += [
+        f"Mean over views ({views_text(run)}) of the median of {rounds} rounds; {threads} threads "
+        "where a program takes a number. In each round a peer runs right beside the strongest "
+        "Embree on the same rays. Time a ray over that of the strongest Embree: geometric mean "
+        "over views of the median of the paired ratios, [95 % bootstrap interval over rounds]; "
+        "the row embree is that against itself.",
+        "Timed: from rays in a peer's own arrays to its evaluated results. Making those arrays, "
+        "the first call (which compiles) and the way back to NumPy are not in it, and neither "
+        "are the hybrid's lists and pyramid: see 'View by view'.",
+        "Same primitive: the share of all rays, of both kinds, whose primitive (or miss) is that "
+        "of robust Embree. Largest error of t: |t - t_ref| / t_ref where it is the same.",
+        "Cores busy: processor time of the whole process over wall time while mirror rays are "
+        "traced; less than the threads where the machine was shared. Peak memory: of a process "
+        "with the peer and a scene, over one with the scene alone; the peer's libraries are in it.",
+    ]
+    return _with_reasons(table)
+
+
+def pictures(run: RunData) -> Table:
+    """Return the raster peers beside our raster."""
+    table = Table(
+        "The same picture by OpenGL on the processor",
+        ["", "threads", "draw, ms", "draw / ours", "read back, ms", "cores busy",
+         "same primitive, % of pixels", "depth off, p50", "p99", "largest", "first draw, ms", WHY],
+    )  # fmt: skip
+    for scene, part in by_scene(run.results[run.results.workload == RASTER]):
+        table.rows.append([scene_label(run, scene)])
+        for name, rows in _by_peer(part):
+            done = ok(rows)
+            if done.empty:
+                table.rows.append([name, *[DASH] * (len(table.columns) - 2), _why(rows)])
+                continue
+            table.rows.append(
+                [
+                    name,
+                    f"{int(done.threads.iloc[0])}",
+                    number(float(done.ms.mean())),
+                    _ratio(run, done),
+                    number(float(done.read_ms.mean())),
+                    number(float(done.cores.mean()), 2),
+                    _share(_pooled(done, "same")),
+                    *(_power(float(done[f"depth_{end}"].max())) for end in ("p50", "p99", "max")),
+                    number(float(done.first_ms.max())),
+                    _why(rows),
+                ]
+            )
+    table.notes += [
+        "Draw: from the clear to glFinish, or one call of hybrid_rt.rasterize, which makes the "
+        "derivatives of depth as well; mean over views of the median. Read back: glReadPixels of "
+        "both buffers; ours are NumPy arrays from the start. Ratio as above, beside our raster.",
+        "Depth off: |d - d_ours| / d_ours where the primitive is the same, worst view. llvmpipe "
+        "has a float32 depth buffer, reversed, and gl_PrimitiveID in 32 bits.",
+        "LP_NUM_THREADS is set to the number of threads. llvmpipe starts so many for its tiles; "
+        "vertices, clipping and binning stay on the calling thread.",
+    ]
+    return _with_reasons(table)
+
+
+def agreement(run: RunData) -> Table:
+    """Return how the answers of each peer differ from those of robust Embree."""
+    table = Table(
+        "How answers differ from those of robust Embree, % of rays",
+        ["", "rays", "differ", "other primitive at the same place", "hit before t_near",
+         "error of t, p99", "largest"],
+        detail=True,
+    )  # fmt: skip
+    for workload in TRACED:
+        rows = ok(run.results[run.results.workload == workload])
+        if len(rows):
+            table.rows.append([f"{workload} rays, all scenes"])
+        for name, part in _by_peer(rows):
+            table.rows.append(
+                [
+                    name,
+                    f"{int(part.rays.sum()):,}",
+                    f"{int(part.different.sum()):,} ({number(100 - 100 * _pooled(part, 'same'))})",
+                    number(100 * _pooled(part, "same_place")),
+                    number(100 * _pooled(part, "early")),
+                    _power(float(part.t_p99.max())),
+                    _power(float(part.t_max.max())),
+                ]
+            )
+    table.notes.append(
+        "At the same place: both hit, and t differs by less than 1e-5 of it: a shared edge or a "
+        "duplicate. Before t_near: only our own calls can tell Embree where a ray begins to count."
+    )
+    return table
+
+
+def views(run: RunData) -> Table:
+    """Return every peer on every view."""
+    table = Table(
+        "View by view",
+        ["", "way", "ms", "Mrays/s", "time / strongest", "first call, ms", "before it, ms"],
+        detail=True,
+    )
+    keys = ["scene", "camera", "width", "height", "workload"]
+    for _, part in ok(run.results).groupby(keys, sort=False):
+        one: Any = part.iloc[0]
+        size = f"{int(one.width)}x{int(one.height)}"
+        table.rows.append([f"{one.scene}, {one.camera}, {size}, {one.workload}"])
+        for _, row in part.iterrows():
+            table.rows.append(
+                [
+                    row.technique,
+                    row.label or DASH,
+                    interval(row.ms, row.ms_low, row.ms_high),
+                    number(row.rays / row.ms / 1e3),
+                    interval(row.ratio, row.ratio_low, row.ratio_high),
+                    number(row.first_ms),
+                    number(row.convert_ms),
+                ]
+            )
+    table.notes.append(
+        "Before it: making the peer's arrays; for the hybrid, lists of primitives and the pyramid; "
+        "for Mitsuba, compiling both kernels and trying them as well; for llvmpipe, the frame "
+        "buffer and a picture. In pictures, pixels for rays, and the ratio is to our raster."
+    )
+    return table
+
+
+def programs(run: RunData) -> Table:
+    """Return what each peer is, and its version."""
+    table = Table("The programs", ["", "version", "what is called"], detail=True)
+    for peer in run.meta["peers"]:
+        version = ", ".join(text for text in (peer["version"], peer["detail"]) if text)
+        table.rows.append([peer["name"], version, peer["description"]])
+    return table
+
+
+def rate(rows: pd.DataFrame) -> float:
+    """Return millions of rays a second over all views, NaN for no view."""
+    return float(rows.rays.sum() / rows.ms.sum() / 1e3) if len(rows) else float("nan")
+
+
+def traced(run: RunData) -> pd.DataFrame:
+    """Return the rows of what traces rays."""
+    return run.results[run.results.workload != RASTER]
+
+
+def ok(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of what ran."""
+    return rows[rows.state == "ok"]
+
+
+def by_scene(rows: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
+    """Return the rows of each scene."""
+    return [(str(name), part) for name, part in rows.groupby("scene", sort=False)]
+
+
+def _by_peer(rows: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
+    return [(str(name), part) for name, part in rows.groupby("technique", sort=False)]
+
+
+def _ratio(run: RunData, rows: pd.DataFrame) -> str:
+    """Return the geometric mean over views of the ratio of times, from the raw samples."""
+    keys = ["scene", "camera", "width", "height", "technique", "workload"]
+    mine = run.samples.merge(rows[[*keys, "rays"]], on=keys) if len(rows) else pd.DataFrame()
+    groups = []
+    for _, part in mine.groupby(keys, sort=False) if len(mine) else ():
+        seconds, rays, beside, amount = (
+            part[c].to_numpy(np.float64) for c in ("seconds", "rays", "beside", "beside_rays")
+        )
+        groups.append((seconds / rays) / (beside / amount))
+    if not groups:
+        return DASH
+    mean = stats.geometric_mean_of_medians(groups)
+    return interval(mean.value, mean.low, mean.high)
+
+
+def _pooled(rows: pd.DataFrame, column: str) -> float:
+    """Return a share over the rays of all rows."""
+    return float((rows[column] * rows.rays).sum() / rows.rays.sum())
+
+
+def _share(value: float) -> str:
+    """Return a share near 1 in per cent, with as many nines as it has."""
+    return "100" if value == 1 else f"{100 * value:.4f}"
+
+
+def _power(value: float) -> str:
+    return DASH if not np.isfinite(value) else "0" if value == 0 else f"{value:.1e}"
+
+
+def _why(rows: pd.DataFrame) -> str:
+    """Return why a peer did not run, or not on all rays; empty if it did."""
+    return "; ".join(str(reason) for reason in dict.fromkeys(rows.reason[rows.state != "ok"]))
+
+
+def _with_reasons(table: Table) -> Table:
+    """Return the table without its last column if that is empty."""
+    if not any(row[-1] for row in table.rows if len(row) > 1):
+        table.columns.pop()
+        for row in table.rows:
+            if len(row) > 1:
+                row.pop()
+    return table
+
+
+def views_text(run: RunData) -> str:
+    """Return how many views there are, and of which sizes, in words."""
+    cells: Any = run.results[["scene", "camera", "width", "height"]].drop_duplicates()
+    sizes = ", ".join(
+        dict.fromkeys(f"{int(w)}x{int(h)}" for w, h in zip(cells.width, cells.height, strict=True))
+    )
+    return f"{len(cells)} view{'s' if len(cells) != 1 else ''}, {sizes}"
+
+
+def scene_label(run: RunData, scene: str) -> str:
+    """Return a scene's name with its number of triangles."""
+    n = next(int(e["triangles"]) for e in run.meta["scenes"] if e["name"] == scene)
+    count = f"{n}" if n < 10_000 else f"{n / 1e3:.0f}k" if n < 1e6 else f"{n / 1e6:.2f}M"
+    return f"{scene} ({count} triangles)"

@@ -1,0 +1,1 @@
+"""Measure: scenes, rays, the strongest Embree, the machine, the life of a run."""

@@ -1,0 +1,1 @@
+"""The folder of a run, what its columns mean, and the statistics of its samples."""
