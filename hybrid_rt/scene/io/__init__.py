@@ -10,6 +10,8 @@ import os
 import warnings
 from pathlib import Path
 
+import numpy as np
+
 from hybrid_rt import _check
 from hybrid_rt.errors import ArgumentError, MeshFileError
 from hybrid_rt.scene.io import npz, obj, ply, stl
@@ -73,20 +75,25 @@ def read_mesh(path: str | Path, *, max_bytes: int | None = None) -> Mesh:
     path = _regular_file(path, SUFFIXES, "mesh")
     budget = Budget(max_bytes)
     try:
-        if path.suffix.lower() == ".npz":
-            return Mesh.from_arrays(**npz.read(path, budget))
-        data = _bytes(path, budget)
-        if path.suffix.lower() in _GLTF:
-            found = reader.read(path, data, budget)
-        else:
-            found = _ONE_FILE[path.suffix.lower()](data)
-        mesh = Mesh.from_arrays(found.vertices, found.faces, found.object_id, found.polygon_id)
-    except (FormatError, ArgumentError, MemoryError, OSError) as error:
+        with np.errstate(all="ignore"):  # what overflows is refused as not finite
+            mesh, skipped = _read(path, budget)
+    except Exception as error:
         raise _named(path, error) from error
-    if found.skipped:
-        message = f"{path}: its {found.skipped} are left out; only triangles are read"
+    if skipped:
+        message = f"{path}: its {skipped} are left out; only triangles are read"
         warnings.warn(message, UserWarning, stacklevel=2)
     return mesh
+
+
+def _read(path: Path, budget: Budget) -> tuple[Mesh, str]:
+    """Return the mesh, and in words what was left out."""
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        return Mesh.from_arrays(**npz.read(path, budget)), ""
+    data = _bytes(path, budget)
+    found = reader.read(path, data, budget) if suffix in _GLTF else _ONE_FILE[suffix](data)
+    arrays = found.vertices, found.faces, found.object_id, found.polygon_id
+    return Mesh.from_arrays(*arrays), found.skipped
 
 
 def read_cameras(path: str | Path, *, max_bytes: int | None = None) -> list[FileCamera]:
@@ -113,7 +120,7 @@ def read_cameras(path: str | Path, *, max_bytes: int | None = None) -> list[File
     path = _regular_file(path, _GLTF, "glTF")
     try:
         return cameras.read(path, _bytes(path, Budget(max_bytes)))
-    except (FormatError, MemoryError, OSError) as error:
+    except Exception as error:
         raise _named(path, error) from error
 
 
@@ -171,7 +178,14 @@ def _bytes(path: Path, budget: Budget) -> bytes:
 
 
 def _named(path: Path, error: Exception) -> MeshFileError:
-    what = "more than memory can hold" if isinstance(error, MemoryError) else str(error)
-    if isinstance(error, OSError):
-        what = error.strerror or str(error)
+    """Return the error of a file; readers mean the first two kinds, the system the next two."""
+    match error:
+        case FormatError() | ArgumentError():
+            what = str(error)
+        case MemoryError():
+            what = "more than memory can hold"
+        case OSError():
+            what = error.strerror or str(error)
+        case _:
+            what = f"corrupt in a way that no check foresaw ({type(error).__name__}: {error})"
     return MeshFileError(f"{path}: {what}")

@@ -95,9 +95,9 @@ def _header(data: bytes) -> tuple[str, list[Element], int]:
 
 
 def _vertices(body: Body) -> F64:
-    columns = body.get("vertex", {})
-    if "vertex" in body and not columns:
+    if "vertex" not in body:
         return np.empty((0, 3))
+    columns = body["vertex"]
     missing = [axis for axis in "xyz" if not isinstance(columns.get(axis), np.ndarray)]
     if missing:
         raise FormatError(f"element vertex: no property {' '.join(missing)}")
@@ -110,7 +110,7 @@ def _vertices(body: Body) -> F64:
 
 def _indices(body: Body, element: str) -> Lists | None:
     """Return the lists of vertices of an element, None where there is no such element."""
-    if element not in body or len(body[element]) == 0:
+    if element not in body:
         return None
     for name in _INDICES:
         column = body[element].get(name)

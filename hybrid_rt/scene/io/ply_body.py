@@ -109,12 +109,13 @@ def _number(word: bytes) -> float:
 def _rows(
     source: _Source, begin: int, elements: list[Element], wanted: frozenset[str]
 ) -> tuple[Body, int]:
-    """Return all columns, and where the last row ends."""
+    """Return all columns of elements that have rows, and where the last row ends."""
     body: Body = {}
     row = 0
     for element in elements:
         columns, begin = _element(source, begin, element, row, wanted)
-        body[element.name] = columns if element.rows else {}
+        if element.rows:
+            body[element.name] = columns
         row += element.rows if element.properties else 0
     return body, begin
 

@@ -53,10 +53,12 @@ def triangulate(
     Raises
     ------
     FormatError
-        A polygon that crosses itself.
+        A polygon that crosses itself; coordinates that `Mesh` would refuse.
     """
     if len(counts) == 0 or (counts == 3).all():
         return corners.reshape(-1, 3), np.arange(len(counts))
+    if np.abs(vertices).max() > np.finfo(np.float32).max:
+        raise FormatError("polygons, and coordinates beyond float32")
     begin = np.cumsum(counts) - counts
     faces, owners = [], []
     for n in np.unique(counts).tolist():

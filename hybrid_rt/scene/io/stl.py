@@ -93,6 +93,7 @@ def _facets(text: bytes, begin: int, end: int) -> words.F64:
         return FormatError(f"line {line}, facet {word // width} of its solid: {what}")
 
     usable = len(found.start) // width * width
+    bad = len(found.start)
     for k, wanted in enumerate(_FACET):
         if wanted == b".":
             continue
@@ -102,9 +103,11 @@ def _facets(text: bytes, begin: int, end: int) -> words.F64:
             at = np.minimum(start + j, len(found.text) - 1)
             same &= (found.text[at] | 32) == letter
         if not same.all():
-            word = int(np.argmin(same)) * width + k
-            got = words.shown(found.word(word))
-            raise fault(word, f"expected {wanted.decode()}, got {got}")
+            bad = min(bad, int(np.argmin(same)) * width + k)
+    if bad < len(found.start):
+        wanted = _FACET[bad % width]
+        got = words.shown(found.word(bad))
+        raise fault(bad, f"expected {wanted.decode()}, got {got}")
     if usable < len(found.start):
         raise fault(usable, f"truncated: {len(found.start) - usable} words of {width}")
     chosen = (np.arange(0, usable, width)[:, None] + np.array(_NUMBERS)).ravel()

@@ -221,6 +221,8 @@ def _influences(arrays: Arrays, attributes: At, draco: Draco | None, n: int) -> 
             values = _attribute(arrays, place, draco, name, "VEC4")
             if values.shape != (n, 4):
                 raise place.fault(f"{len(values)} of them for {n} positions")
+            if name.startswith("J") and not (values == np.floor(values)).all():
+                raise place.fault("joints that are no whole numbers")
             into.append(values)
     if not joints:
         raise attributes.fault("no JOINTS_0 in a mesh that has a skin")

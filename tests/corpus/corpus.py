@@ -1,0 +1,136 @@
+"""Read every small mesh of public collections and compare with other readers.
+
+Run ``python tests/corpus/corpus.py NAME=FOLDER ...`` from the root, each FOLDER a checkout of a
+public repository, such as mikedh/trimesh or assimp/assimp. The list goes to
+``tests/corpus/results.csv``; the meshes themselves are never kept here. Needs the extras ``corpus``
+and ``gltf``.
+
+A file agrees when the triangles, the area and the bounds are those of one other reader at least.
+``explained.csv`` says of the files that differ from all of them who is right, and why.
+"""
+
+import csv
+import functools
+import json
+import subprocess
+import sys
+import warnings
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import second
+
+import hybrid_rt as hrt
+
+HERE = Path(__file__).resolve().parent
+RESULTS = HERE / "results.csv"
+EXPLAINED = HERE / "explained.csv"
+SUFFIXES = (".obj", ".ply", ".stl", ".gltf", ".glb")
+LARGEST = 20 << 20
+COLUMNS = ("collection", "file", "triangles", "area", "bounds", "verdict", "by", "reason")
+CLOSE = 2e-5  # of the area, and of the diagonal: some readers transform in float32
+
+
+def small_meshes(folder):
+    """Return the mesh files below a folder, in the order of their names."""
+    found = [p for p in sorted(folder.rglob("*")) if p.suffix.lower() in SUFFIXES and p.is_file()]
+    return [p for p in found if p.stat().st_size <= LARGEST]
+
+
+def ours(path):
+    """Return what this project reads, measured, or its refusal."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            mesh = hrt.read_mesh(path)
+        except hrt.MeshFileError as error:
+            return {"error": str(error).removeprefix(f"{path}: ")}
+    return second.measured(mesh.vertices[mesh.faces])
+
+
+def another(reader, path):
+    """Return what another reader reads."""
+    words = [sys.executable, str(HERE / "second.py"), reader, str(path)]
+    try:
+        done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+        return json.loads(done.stdout.splitlines()[-1])
+    except (subprocess.TimeoutExpired, IndexError, ValueError):
+        return {"error": "it died"}
+
+
+def same(a, b):
+    """Return whether two measurements are of the same triangles."""
+    if a.get("triangles") != b.get("triangles"):
+        return False
+    low_high = list(zip(a["bounds"], b["bounds"], strict=True))
+    diagonal = sum((a["bounds"][k] - a["bounds"][k + 3]) ** 2 for k in range(3)) ** 0.5
+    near = max(abs(x - y) for x, y in low_high) <= CLOSE * diagonal
+    return near and abs(a["area"] - b["area"]) <= CLOSE * max(a["area"], diagonal**2 * 1e-3)
+
+
+def brief(found):
+    """Return a measurement in a few words."""
+    return found.get("error") or f"{found['triangles']} triangles, area {found['area']:.6g}"
+
+
+def compare(name, folder, path, explained):
+    """Return the row of one file."""
+    row = dict.fromkeys(COLUMNS, "")
+    row |= {"collection": name, "file": path.relative_to(folder).as_posix()}
+    mine = ours(path)
+    if "error" in mine:
+        return row | {"verdict": "refused", "reason": mine["error"]}
+    row |= {
+        "triangles": mine["triangles"],
+        "area": f"{mine['area']:.6g}",
+        "bounds": " ".join(f"{x:.6g}" for x in mine["bounds"]),
+    }
+    others = {reader: another(reader, path) for reader in second.READERS}
+    agree = [reader for reader, found in others.items() if same(mine, found)]
+    if agree:
+        return row | {"verdict": "agrees", "by": " ".join(agree)}
+    told = explained.get((name, row["file"]))
+    if told:
+        return row | {"verdict": "explained", "reason": told}
+    said = "; ".join(f"{reader}: {brief(found)}" for reader, found in others.items())
+    return row | {"verdict": "differs", "reason": said}
+
+
+def explanations():
+    """Return reasons by collection and file."""
+    with EXPLAINED.open(newline="") as file:
+        return {(r["collection"], r["file"]): r["reason"] for r in csv.DictReader(file)}
+
+
+def rows(collections, jobs=2):
+    """Return the rows of all files."""
+    explained = explanations()
+    made = []
+    for name, folder in collections.items():
+        row = functools.partial(compare, name, folder, explained=explained)
+        with ThreadPoolExecutor(jobs) as pool:
+            made += pool.map(row, small_meshes(folder))
+    return made
+
+
+def main(words):
+    """Write the list and a summary; return 1 when a file differs from all readers, unexplained."""
+    collections = {name: Path(folder) for name, _, folder in (w.partition("=") for w in words)}
+    made = rows(collections)
+    with RESULTS.open("w", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(made)
+    verdicts = ("agrees", "explained", "differs", "refused")
+    for name in collections:
+        here = [r["verdict"] for r in made if r["collection"] == name]
+        print(name, len(here), *(f"{v} {here.count(v)}" for v in verdicts))
+    differing = [r for r in made if r["verdict"] == "differs"]
+    for row in differing:
+        mine = f"{row['triangles']} triangles, area {row['area']}"
+        print(f"{row['collection']}/{row['file']}: {mine}; {row['reason']}")
+    return 1 if differing else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
