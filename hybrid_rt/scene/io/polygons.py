@@ -9,7 +9,8 @@ rim. It leaves out corners that lie on a straight edge.
 
 A polygon need not be plane: corners are judged along the normal that its rim has on average
 (Newell). One without area, all corners on a line, becomes triangles without area. One that
-crosses itself has no inside that files define, and is refused.
+crosses itself, or is bent so far that it does seen along its normal, or goes around twice, has no
+inside that files define, and is refused.
 """
 
 from __future__ import annotations
@@ -124,7 +125,21 @@ def _fan_fits(points: F64) -> NDArray[np.bool_]:
     signed = np.einsum("pkc,pc->pk", crosses, up)
     turned = np.arctan2(signed, np.einsum("pkc,pkc->pk", rim[:, :-1], rim[:, 1:])).sum(axis=1)
     once = turned <= 2 * np.pi + 1e-9
-    return np.asarray((length > doubt) & (signed >= -doubt[:, None]).all(axis=1) & once)
+    fits = (length > doubt) & (signed >= -doubt[:, None]).all(axis=1) & once
+    return np.asarray(fits & ~_goes_around_again(points, up))
+
+
+def _goes_around_again(points: F64, up: F64) -> NDArray[np.bool_]:
+    """Return which rims (P, n, 3) turn twice or more: those of no simple polygon do.
+
+    Where a rim turns back it could have turned either way; the way that counts less is taken.
+    """
+    along = np.roll(points, -1, axis=1) - points
+    after = np.roll(along, -1, axis=1)
+    sine = np.einsum("pkc,pc->pk", np.cross(along, after), up)
+    angle = np.arctan2(sine, np.einsum("pkc,pkc->pk", along, after))
+    angle[angle > np.pi - 1e-6] = -np.pi
+    return np.asarray(angle.sum(axis=1) > 3 * np.pi)
 
 
 def _one(points: F64) -> I64 | None:
@@ -138,6 +153,8 @@ def _one(points: F64) -> I64 | None:
     loose = float(_doubt(points, _ROUNDED))
     if np.linalg.norm(crosses, axis=1).sum() <= loose:
         return _fan(n)  # nothing but a line
+    if _goes_around_again(points[None], normal[None])[0]:
+        return None
     axis = int(np.argmax(np.abs(normal)))
     twice = float(normal[axis])
     if abs(twice) <= float(_doubt(points, _SURE)):
@@ -157,7 +174,20 @@ def _one(points: F64) -> I64 | None:
         other = abs(np.abs(_twice_areas(flat, fan)).sum() - abs(twice))
         if other < excess:
             best, excess = fan, other
-    return best if excess <= loose else None
+    return best if excess <= loose and _left_out_is_straight(points, best, loose) else None
+
+
+def _left_out_is_straight(points: F64, triangles: I64, loose: float) -> bool:
+    """Return whether corners without triangles lie between their neighbours, as space has them."""
+    used = np.zeros(len(points), bool)
+    used[triangles] = True
+    kept = np.flatnonzero(used)
+    for k in np.flatnonzero(~used).tolist():
+        place = int(np.searchsorted(kept, k))
+        before, after = points[kept[place - 1]], points[kept[place % len(kept)]]
+        if np.linalg.norm(np.cross(points[k] - before, after - before)) > loose:
+            return False
+    return True
 
 
 def _twice_areas(flat: F64, triangles: I64) -> F64:

@@ -114,6 +114,8 @@ CROSSING = {
     "bow tie": [(0, 0), (1, 1), (1, 0), (0, 1)],
     "lopsided bow tie": [(0, 0), (2, 1), (2, 0), (0, 2)],
     "pentagram": [(np.cos(a), np.sin(a)) for a in np.arange(5) * np.pi * 4 / 5],
+    "twice around": [(np.cos(a), np.sin(a)) for a in np.arange(12) * np.pi / 3 + 0.01],
+    "twice around the same": [(0, 0), (1, 0), (1, 1), (0, 1)] * 2,
     "loop": [(0, 0), (4, 0), (4, 4), (1, -1), (0, 4)],
 }
 
@@ -125,6 +127,14 @@ def test_polygons_that_cross_themselves_are_refused_with_their_line(tmp_path, na
     refused(
         write(tmp_path / "m.obj", points, range(3), range(n)), f"line {n + 2}: a polygon of {n}"
     )
+
+
+def test_a_polygon_that_is_bent_too_far_is_refused(tmp_path):
+    # mikedh/trimesh models/polygonfaces.obj: seen along its normal, one corner is on an edge
+    points = [(-5, 0, 5), (5, 0, 5), (5, 0, -5), (-5, 0, -5), (0, 5, -5)]
+    refused(write(tmp_path / "m.obj", points, range(5)), "line 6: a polygon of 5")
+    slightly = [(*p, 0.01 * k) for k, p in enumerate(L)]
+    assert area(hrt.read_mesh(write(tmp_path / "m.obj", slightly, range(6)))) > 7
 
 
 def test_concave_polygons_far_from_the_origin(tmp_path):
