@@ -64,13 +64,18 @@ class Arrays:
         if k not in self._decoded:
             view = self.views[k]
             packed = next(filter(None, map(view.extension, codecs.MESHOPT)), None)
-            if packed is None:
+            if packed is None or self._has_fallback(view):
                 self._decoded[k] = np.frombuffer(self.part(view), np.uint8)
             else:
                 count, stride = (packed.need(n).integer(1) for n in ("count", "byteStride"))
                 self._budget.spend(count * stride, packed.place)
                 self._decoded[k] = codecs.meshopt(packed, self.part(packed))
         return self._decoded[k]
+
+    def _has_fallback(self, view: At) -> bool:
+        """Return whether a compressed buffer view has plain bytes too, for other readers."""
+        buffer = self.buffers[view.need("buffer").index(self.buffers)]
+        return buffer.get("uri") is not None
 
     def floats(self, place: At, kind: str) -> F64:
         """Return an accessor (count, width) as float64, normalised where it says so."""

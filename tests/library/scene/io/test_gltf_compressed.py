@@ -92,6 +92,17 @@ def test_meshopt(tmp_path, name, sequence):
     )
 
 
+def test_meshopt_with_a_fallback_uses_that(tmp_path, monkeypatch):
+    g = meshopt()
+    plain = SQUARE.tobytes() + HALVES.tobytes()
+    (tmp_path / "plain.bin").write_bytes(plain)
+    g.tree["buffers"][1]["uri"] = "plain.bin"
+    g.tree["bufferViews"][1]["byteOffset"] = 48
+    monkeypatch.setitem(sys.modules, "meshoptimizer", None)
+    mesh = hrt.read_mesh(g.write(tmp_path / "m.glb"))
+    assert triangles(mesh) == SQUARE[HALVES.reshape(2, 3)].tolist()
+
+
 WRONG = {"mode": ("X", "mode X"), "filter": ("OCTAHEDRAL", "filter OCTAHEDRAL"),
          "byteStride": (10, "byteStride 10"), "count": (10**12, "limit"),
          "byteLength": (8, "corrupt data")}  # fmt: skip

@@ -127,15 +127,15 @@ def mutated(rng, data):
 def test_damaged_files_give_a_mesh_or_a_named_error(tmp_path, suffix):
     rng = np.random.default_rng(zlib.crc32(suffix.encode()))
     path = tmp_path / f"m{suffix}"
-    read = 0
+    refusals = []
     for _ in range(ROUNDS):
         WRITERS[suffix](path, *soup(rng, 9, 7), rng)
         path.write_bytes(mutated(rng, path.read_bytes()))
         for reader in (hrt.read_mesh, *([read_cameras] if suffix.startswith(".gl") else [])):
             try:
                 reader(path, max_bytes=1 << 24)
-                read += 1
             except hrt.MeshFileError as error:
-                assert str(path) in str(error)
-                assert "no check foresaw" not in str(error), str(error)
-    assert read < 2 * ROUNDS
+                refusals.append(str(error))
+    assert refusals
+    assert all(str(path) in text for text in refusals)
+    assert not [text for text in refusals if "no check foresaw" in text]
