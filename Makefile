@@ -14,6 +14,7 @@ help:
 	@echo "make mutation   take away the guards of the certified proof, one at a time"
 	@echo "make oldest     try everything once with the oldest dependencies that are allowed"
 	@echo "make fuzz       junk at every argument of the public API, all of it"
+	@echo "make cold-start  seconds that the first picture waits for compilation"
 	@echo "make clean      remove .venv and caches"
 
 $(STAMP): pyproject.toml
@@ -56,3 +57,7 @@ fuzz: $(STAMP)
 clean:
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+.PHONY: cold-start
+cold-start: $(STAMP)
+	$(BIN)/python bench/cold_start.py

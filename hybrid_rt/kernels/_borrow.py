@@ -19,15 +19,38 @@ def borrowed(typingctx, array):
         raise errors.TypingError(f"borrowed: array must be an array, got {array}")
 
     def generate(context, builder, signature, arguments):
-        make = context.make_array(array)
-        old, new = make(context, builder, arguments[0]), make(context, builder)
-        for name in ("nitems", "itemsize", "data", "shape", "strides"):
-            setattr(new, name, getattr(old, name))
-        for name in ("meminfo", "parent"):
-            setattr(new, name, cgutils.get_null_value(getattr(old, name).type))
-        return new._getvalue()
+        return _uncounted(context, builder, array, arguments[0])
 
     return array(array), generate
+
+
+@intrinsic
+def borrowed_record(typingctx, record):
+    """Return a tuple as it is, but its arrays as `borrowed` returns them."""
+    if not isinstance(record, types.BaseTuple):
+        raise errors.TypingError(f"borrowed_record: record must be a tuple, got {record}")
+
+    def generate(context, builder, signature, arguments):
+        made = arguments[0]
+        for index, kind in enumerate(record):
+            if isinstance(kind, types.Array):
+                array = builder.extract_value(made, index)
+                array = _uncounted(context, builder, kind, array)
+                made = builder.insert_value(made, array, index)
+        return made
+
+    return record(record), generate
+
+
+def _uncounted(context, builder, kind, array):
+    """Return a value of an array type without what its references are counted by."""
+    make = context.make_array(kind)
+    old, new = make(context, builder, array), make(context, builder)
+    for name in ("nitems", "itemsize", "data", "shape", "strides"):
+        setattr(new, name, getattr(old, name))
+    for name in ("meminfo", "parent"):
+        setattr(new, name, cgutils.get_null_value(getattr(old, name).type))
+    return new._getvalue()
 
 
 @intrinsic

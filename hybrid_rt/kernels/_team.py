@@ -28,19 +28,22 @@ class Share(NamedTuple):
 
 
 class _Job:
-    """A share of a call, for another thread to work on.
+    """A share of a call, for whichever thread comes to it first.
 
     `counter` is what the share's address leads to: an interrupted caller may be gone before.
     """
 
     def __init__(self, work: Callable[[], object], counter: NDArray[np.int64]) -> None:
         self._work, self._counter = work, counter
+        self._taken = threading.Lock()
         self._done = threading.Lock()
         self._done.acquire()
         self._error: BaseException | None = None
 
     def run(self) -> None:
-        """Do the work; `wait` returns then, or raises what went wrong."""
+        """Do the work unless another thread has begun to; `wait` raises what goes wrong."""
+        if not self._taken.acquire(blocking=False):
+            return
         try:
             self._work()
         except BaseException as error:  # whoever waits for it raises it
@@ -49,7 +52,7 @@ class _Job:
             self._done.release()
 
     def wait(self) -> None:
-        """Wait for another thread to have run this job."""
+        """Wait for the thread that has taken this job to be done with it."""
         self._done.acquire()
         if self._error is not None:
             raise self._error
@@ -111,6 +114,9 @@ def on_all_threads(kernel: Any) -> Any:
         _team.give(jobs)
         try:
             kernel(Share(0, workers, address), *arguments)
+            # On a busy machine a thread may wake up late: a share that waits for it is done here.
+            for job in jobs:
+                job.run()
         finally:
             # The counter and the arrays are in use until the last thread is done.
             for job in jobs:

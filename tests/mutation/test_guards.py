@@ -11,7 +11,7 @@ SPEC = importlib.util.spec_from_file_location("guards", Path(__file__).with_name
 guards = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(guards)
 
-SAMPLE = ("no margin", "skipped rays taken for free")
+SAMPLE = ("no margin", "what falls out of a list forgotten", "skipped rays taken for free")
 
 
 @pytest.mark.parametrize("mutant", guards.MUTANTS, ids=lambda mutant: mutant.name)

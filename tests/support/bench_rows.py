@@ -6,7 +6,7 @@ import numpy as np
 
 ENVIRONMENT = {
     "cpu": "a CPU", "threads": 2, "os": "an OS", "embree": {"version": "4"},
-    "packages": {"numba": "0"}, "git": None, "threading_layer": "omp",
+    "packages": {"numba": "0"}, "git": None,
 }  # fmt: skip
 
 NOTHING = {float: math.nan, int: 0, bool: False, str: "", list: [], dict: {}}

@@ -20,10 +20,7 @@ BUSY = 0.25
 
 
 def describe(threads: int) -> dict[str, Any]:
-    """Return the environment as plain data.
-
-    Call it after the first parallel kernel has run, else Numba has no threading layer yet.
-    """
+    """Return the environment as plain data."""
     return {
         "hybrid_rt": hrt.__version__,
         "python": platform.python_version(),
@@ -34,7 +31,6 @@ def describe(threads: int) -> dict[str, Any]:
         "logical_cores": usable_cores(),
         "memory_bytes": psutil.virtual_memory().total,
         "threads": threads,
-        "threading_layer": threading_layer(),
         "embree": hrt.embree_info(),
         "packet_path": hrt.embree_problem() or "available",
         "git": git_commit(),
@@ -50,11 +46,6 @@ def problems(environment: dict[str, Any]) -> list[str]:
         found.append(
             f"the machine is busy: load average {load:.1f} on {cores} cores; close other programs, "
             "or trust only ratios of stages measured side by side"
-        )
-    if environment["threading_layer"] == "workqueue":
-        found.append(
-            "Numba uses its threading layer 'workqueue', the slowest; install tbb, or a compiler's "
-            "OpenMP runtime, to be rid of it"
         )
     if environment["packet_path"] != "available":
         found.append(
@@ -97,14 +88,6 @@ def checked_threads(threads: int | None) -> int:
     if not 1 <= threads <= most:
         raise hrt.ArgumentError("threads", f"1 to {most} (the cores of this machine)", str(threads))
     return threads
-
-
-def threading_layer() -> str:
-    """Return Numba's threading layer, once a parallel kernel has run."""
-    try:
-        return str(numba.threading_layer())  # type: ignore[attr-defined]
-    except ValueError:
-        return "not started"
 
 
 def load_average() -> float | None:

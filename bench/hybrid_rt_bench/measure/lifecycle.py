@@ -240,7 +240,8 @@ def carry_out(
         kept = memory.keep_freed()
         try:
             load = env.load_average()  # before this program adds to it
-            writer.meta["compile_seconds"] = compiling.first_calls(stages(), reporter.stage)
+            with compiling.told(reporter.kernel):
+                writer.meta["compile_seconds"] = compiling.first_calls(stages(), reporter.stage)
             writer.meta["environment"] = environment = {
                 **env.describe(threads),
                 "load_average": load,

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import time
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+if TYPE_CHECKING:
+    from hybrid_rt.compiling import Compiling
 
 QUIET = 2.0
 """Seconds between two lines about compilation, at least."""
@@ -35,6 +39,7 @@ class Reporter:
         )
         self._task = self._bar.add_task("starting", total=None, unit="rounds")
         self._compiling, self._said = 0.0, 0.0
+        self._told: set[str] = set()
 
     def __enter__(self) -> Reporter:
         self._bar.start()
@@ -89,6 +94,21 @@ class Reporter:
         if not self.console.is_terminal and (index == 1 or now - self._said > QUIET):
             self.say(text)
             self._said = now
+
+    def kernel(self, now: Compiling) -> None:
+        """Say which part of the library is compiled just now, as `hybrid_rt.compiling` tells it.
+
+        Off a terminal each part is told once.
+        """
+        text = (
+            f"compiling {now.stage}: {now.done} of {now.total} functions done, about "
+            f"{now.seconds_left:.0f} s left of it, once on this machine"
+        )
+        self.doing(text)
+        if not self.console.is_terminal and now.stage not in self._told:
+            self._told.add(now.stage)
+            self.say(text)
+            self._said = time.monotonic()
 
     def say(self, text: str, style: str = "") -> None:
         """Print a line that stays."""

@@ -8,7 +8,7 @@ from hybrid_rt_bench.results.folder import RunData
 def differences(a: RunData, b: RunData) -> list[str]:
     """Return a sentence for each thing that should be the same and is not."""
     found = []
-    for key in ("cpu", "threads", "threading_layer", "os"):
+    for key in ("cpu", "threads", "os"):
         was, now = a.meta["environment"][key], b.meta["environment"][key]
         if was != now:
             found.append(f"The runs differ in {key}: {was} and {now}.")

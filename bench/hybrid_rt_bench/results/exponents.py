@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.stats import linregress
 from scipy.stats import t as student
 
 from hybrid_rt_bench.results import statistics as stats
@@ -57,12 +58,11 @@ def fit(sizes: ArrayLike, times: ArrayLike, confidence: float = stats.CONFIDENCE
     x, y = np.log(n), np.log(t)
     if len(np.unique(x)) < 2:
         return Exponent(math.nan, -math.inf, math.inf, len(x))
-    dx = x - x.mean()
-    slope = float((dx * (y - y.mean())).sum() / (dx**2).sum())
+    line = linregress(x, y)
+    slope = float(line.slope)
     if len(x) < 3:
         return Exponent(slope, -math.inf, math.inf, len(x))
-    rest = y - y.mean() - slope * dx
-    error = math.sqrt(float((rest**2).sum()) / (len(x) - 2) / float((dx**2).sum()))
+    error = float(np.nan_to_num(line.stderr))  # NaN where all times are the same
     half = float(student.ppf((1 + confidence) / 2, len(x) - 2)) * error
     return Exponent(slope, slope - half, slope + half, len(x))
 

@@ -46,7 +46,7 @@ META: dict[str, type] = {
 """What ``run.json`` says of every run, and its type."""
 
 ENVIRONMENT: dict[str, type] = {
-    "cpu": str, "threads": int, "os": str, "threading_layer": str, "embree": dict, "packages": dict,
+    "cpu": str, "threads": int, "os": str, "embree": dict, "packages": dict,
 }  # fmt: skip
 """What reports tell of the machine."""
 

@@ -117,8 +117,6 @@ VIEW = (
 HYBRID_STAGES = ("march", "compaction", "fallback", "merge")
 """The stages whose sum is the time of the hybrid."""
 
-COMPILED = Column("compile_seconds", "What compiling took, or loading what was compiled", "s")
-
 
 @dataclass(frozen=True)
 class Schema:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba.extending import overload
 
+from hybrid_rt.kernels._borrow import borrowed, borrowed_record
 from hybrid_rt.kernels._jit import OPTIONS, called, parallel_kernel
 from hybrid_rt.kernels._queue import take
 from hybrid_rt.kernels.techniques.screen import CHUNK, screen_ray, write_row
@@ -40,6 +41,10 @@ def marches(numbers_class):
 @called
 def march_chunk(first, last, rays, view, buffers, pyramid, numbers, out, steps_by_level):
     """Set up rays in float64, march them in float32 and write their rows of the outputs."""
+    # The arguments are alive, and counting references to their arrays costs a tenth of the march.
+    rays, view, buffers = borrowed_record(rays), borrowed_record(view), borrowed_record(buffers)
+    pyramid, out = borrowed_record(pyramid), borrowed_record(out)
+    steps_by_level = borrowed(steps_by_level)
     height, width = buffers.depth.shape
     for i in range(first, last):
         ray, scale = screen_ray(i, rays, view, width, height)

@@ -51,6 +51,7 @@ def experiment(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_a_run_is_measured_kept_and_shown_again(monkeypatch, capsys, tmp_path, experiment):
     code, out, err = run(
         monkeypatch, capsys, "run", experiment, "--threads", 1, "--out", tmp_path, "--json"
@@ -87,13 +88,14 @@ def test_a_run_is_measured_kept_and_shown_again(monkeypatch, capsys, tmp_path, e
     assert (folder / "tables.md").read_text() == text
 
 
+@pytest.mark.slow
 def test_a_cell_that_raises_costs_only_itself(monkeypatch, capsys, tmp_path, experiment):
     measure_cell = error_cell.measure_cell
 
-    def breaks(loaded, view, cell, *rest):
-        if len(view.scene) > 100 and view.camera.width == 64 and cell.picture:
+    def breaks(loaded, screens, cell, *rest):
+        if len(loaded.scene) > 100 and screens.gbuffer.camera.width == 64 and cell.picture:
             raise RuntimeError("the lens fell off")
-        return measure_cell(loaded, view, cell, *rest)
+        return measure_cell(loaded, screens, cell, *rest)
 
     monkeypatch.setattr(error_cell, "measure_cell", breaks)
     code, out, err = run(
@@ -106,6 +108,7 @@ def test_a_cell_that_raises_costs_only_itself(monkeypatch, capsys, tmp_path, exp
     assert (summary["measured"], summary["failed"]) == (7, 1)
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_what_is_finished(monkeypatch, capsys, tmp_path, experiment):
     measure_cell, done = error_cell.measure_cell, []
 
@@ -144,6 +147,7 @@ def test_wrong_settings_are_refused_before_measuring(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "points", "title"),
     [

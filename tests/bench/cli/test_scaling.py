@@ -63,6 +63,7 @@ def experiment(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_a_run_is_measured_kept_shown_again_and_compared(monkeypatch, capsys, tmp_path, experiment):
     code, out, err = run(
         monkeypatch, capsys, "run", experiment, "--threads", 1, "--out", tmp_path, "--json"
@@ -107,6 +108,7 @@ def test_a_run_is_measured_kept_shown_again_and_compared(monkeypatch, capsys, tm
     assert "6 cells in common" in out
 
 
+@pytest.mark.slow
 def test_what_is_measured_can_be_chosen(monkeypatch, capsys, tmp_path, experiment):
     code, out, err = run(
         monkeypatch, capsys, "run", experiment, "--threads", 1, "--series", "triangles",
@@ -122,6 +124,7 @@ def test_what_is_measured_can_be_chosen(monkeypatch, capsys, tmp_path, experimen
     assert meta["spec"]["series"][0]["triangles"] == [1024, 3000]
 
 
+@pytest.mark.slow
 def test_a_cell_that_fails_costs_only_itself(monkeypatch, capsys, tmp_path, experiment):
     experiment.write_text(TINY.replace('"2^10..2^12"', "[7, 1024]"))
     code, out, err = run(
@@ -135,6 +138,7 @@ def test_a_cell_that_fails_costs_only_itself(monkeypatch, capsys, tmp_path, expe
     assert "- size, 7: size: expected" in (tmp_path / summary["run"] / "tables.md").read_text()
 
 
+@pytest.mark.slow
 def test_a_process_that_ends_keeps_its_rounds_and_costs_no_other(
     monkeypatch, capsys, tmp_path, experiment
 ):
@@ -158,6 +162,7 @@ def test_a_process_that_ends_keeps_its_rounds_and_costs_no_other(
     assert dict(rounds) == {1024: 2, 4096: 1}
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_what_is_measured_and_ends_the_processes(
     monkeypatch, capsys, tmp_path, experiment
 ):
@@ -187,6 +192,7 @@ def test_ctrl_c_keeps_what_is_measured_and_ends_the_processes(
     assert set(pd.read_parquet(folder / "results.parquet").rounds) == {1}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="prctl is Linux's")
 def test_no_process_outlives_a_run_that_is_killed(tmp_path, experiment):
     experiment.write_text(TINY.replace("rounds = 2", "rounds = 100000"))

@@ -144,6 +144,7 @@ def test_a_bad_setting_is_refused():
         parse_experiment(text, source="x.toml")
 
 
+@pytest.mark.slow
 def test_a_peer_that_cannot_be_imported_has_a_row_with_the_reason(monkeypatch, tmp_path, capsys):
     def absent(scene, threads):
         importlib.import_module("no_such_ray_tracer")
@@ -377,6 +378,7 @@ def test_a_process_that_ends_badly_is_a_reason(code, seconds, reason):
     assert trial.run_alone(code, [], seconds).reason == reason
 
 
+@pytest.mark.slow
 def test_a_trial_tells_memory_or_the_reason(cornell):
     found = trial.attempt(peers.PEERS["embree"], cornell[0], 1, 120)
     assert found.reason == ""
@@ -513,6 +515,7 @@ def test_our_own_rows_are_what_they_say(cornell):
     assert raster["rays"] == gbuffer.depth.size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", REAL)
 def test_a_real_peer_agrees_with_ours(name, cornell):
     """In a process of its own first, as in a run: some crash where their libraries are missing."""

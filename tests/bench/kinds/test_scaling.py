@@ -350,6 +350,7 @@ def test_a_sample_of_rays_is_spread_over_all():
 # Its process
 
 
+@pytest.mark.slow
 def test_a_process_answers_visits_and_counts_memory():
     worker = Worker(Cell, TINY)
     try:
@@ -374,6 +375,7 @@ def test_a_task_that_cannot_be_done_says_why():
         worker.stop()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="processes are ended by signals on POSIX only")
 def test_a_process_that_is_ended_says_how():
     worker = Worker(Cell, TINY)

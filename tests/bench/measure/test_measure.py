@@ -179,13 +179,12 @@ def test_a_scene_that_stands_in_for_two_is_measured_once(monkeypatch, tmp_path):
 
 def test_problems_name_what_would_spoil_timings():
     quiet = {
-        "load_average": 0.0, "logical_cores": 8, "threading_layer": "omp", "threads": 8,
+        "load_average": 0.0, "logical_cores": 8, "threads": 8,
         "packet_path": "available",
     }  # fmt: skip
     before = env.problems(quiet)
     for key, value, said in (
         ("load_average", 6.0, "busy"),
-        ("threading_layer", "workqueue", "workqueue"),
         ("packet_path", "no library", "no library"),
         ("threads", 9, "9 threads on 8"),
     ):

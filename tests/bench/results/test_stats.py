@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+import scipy.stats
 from scipy.stats import binom
 
 from hybrid_rt_bench.results import statistics as stats
@@ -73,3 +74,36 @@ def test_unstable_means_that_the_quartiles_lie_far_apart():
     assert stats.unstable([1.0, 1.3, 0.8, 1.2])
     assert not stats.unstable([1.0, 1.01, 0.99, 1.0])
     assert not stats.unstable([1.0, 9.0])  # two samples have no quartiles worth the name
+
+
+@pytest.mark.parametrize("n", [6, 7, 15, 40])
+@pytest.mark.parametrize("confidence", [0.9, 0.95])
+def test_the_interval_of_a_median_is_that_of_scipy(n, confidence):
+    x = np.random.default_rng(n).lognormal(size=n)
+    found = stats.median(x, confidence)
+    test = scipy.stats.quantile_test(x, q=float(np.median(x)), p=0.5)
+    interval = test.confidence_interval(confidence)
+    assert (found.low, found.high) == (interval.low, interval.high)
+    assert found.coverage >= confidence
+
+
+def test_the_bootstrap_is_that_of_scipy():
+    rng = np.random.default_rng(1)
+    groups = [rng.lognormal(size=n) for n in (5, 7, 9)]
+
+    def mean_of_medians(*samples, axis):
+        medians = np.stack([np.median(np.sort(x, axis=axis), axis=axis) for x in samples])
+        return scipy.stats.gmean(medians, axis=0)
+
+    theirs = scipy.stats.bootstrap(
+        [np.sort(x) for x in groups], mean_of_medians, n_resamples=2000, vectorized=True,
+        paired=False, method="percentile", rng=np.random.default_rng(20250217),
+    ).confidence_interval  # fmt: skip
+    ours = stats.geometric_mean_of_medians(groups)
+    assert (ours.low, ours.high) == pytest.approx((theirs.low, theirs.high), rel=1e-12)
+    assert ours.value == pytest.approx(mean_of_medians(*groups, axis=-1), rel=1e-12)
+
+
+def test_a_group_of_one_round_has_no_spread():
+    found = stats.geometric_mean_of_medians([[2.0], [8.0]])
+    assert (found.value, found.low, found.high) == pytest.approx((4.0, 4.0, 4.0))

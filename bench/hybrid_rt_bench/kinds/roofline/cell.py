@@ -27,6 +27,7 @@ from hybrid_rt_bench.measure.errors import CellError
 from hybrid_rt_bench.measure.loaded import LoadedScene
 from hybrid_rt_bench.measure.primary import primary_rays
 from hybrid_rt_bench.results import statistics as stats
+from hybrid_rt_bench.results.schema import HYBRID_STAGES
 
 Row = dict[str, Any]
 
@@ -218,7 +219,7 @@ def time_columns(samples: list[Row], rays: int) -> Row:
         _put(row, f"{stage}_ms", stats.median(1e3 * seconds[stage]))
     _put(row, "raster_speedup", stats.paired_ratio(seconds["primary"], seconds["raster"]))
     _put(row, "vectors_speedup", stats.paired_ratio(seconds["scalar"], seconds["march"]))
-    hybrid = sum(seconds[stage] for stage in roofline.HYBRID)
+    hybrid = sum(seconds[stage] for stage in HYBRID_STAGES)
     _put(row, "speedup", stats.paired_ratio(seconds["embree"], hybrid))
     return row
 

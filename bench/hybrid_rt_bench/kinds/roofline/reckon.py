@@ -19,8 +19,6 @@ RASTER = ("vertices", "cull", "records", "tiles")
 """Stages of the raster, as in `GBuffer.timings`; beside them are timed "raster", the whole, and
 "primary", the strongest Embree for the primary rays of the same view."""
 
-HYBRID = ("march", "compaction", "fallback", "merge")
-
 STRUCTURES = ("pyramid", "lists", "planes", "corners", "slots")
 """What the march gathers from: the depth pyramid, the lists of primitives, the planes of triangles,
 their corners, and its own slots."""

@@ -36,6 +36,7 @@ import math
 
 import numpy as np
 
+from hybrid_rt.kernels._borrow import borrowed, borrowed_record
 from hybrid_rt.kernels._jit import called, inlined, parallel_kernel
 from hybrid_rt.kernels._queue import take
 from hybrid_rt.kernels.raster.lists_planes import (
@@ -342,6 +343,9 @@ def march_chunk(
     first, last, rays, box, lists, pyramid, scene, limits, out, steps_by_level, tests
 ):  # fmt: skip
     """Set up rays in float64, walk them in float32 and write their rows of the outputs."""
+    rays, box, lists = borrowed_record(rays), borrowed_record(box), borrowed_record(lists)
+    pyramid, scene, out = borrowed_record(pyramid), borrowed_record(scene), borrowed_record(out)
+    steps_by_level = borrowed(steps_by_level)
     height, width = lists.rest.shape
     for i in range(first, last):
         o, d = rays.origin[i], rays.direction[i]
