@@ -2,8 +2,8 @@
 
 Run ``python tests/corpus/corpus.py NAME=FOLDER ...`` from the root, each FOLDER a checkout of a
 public repository, such as mikedh/trimesh or assimp/assimp. The list goes to
-``tests/corpus/results.csv``; the meshes themselves are never kept here. Needs the extras ``corpus``
-and ``gltf``.
+``tests/corpus/results.csv``, a summary to ``docs/results/corpus.md``; the meshes themselves are
+never kept here. Needs the extras ``corpus``, ``draco`` and ``meshopt``.
 
 A file agrees when the triangles, the area and the bounds are those of one other reader at least.
 ``explained.csv`` says of the files that differ from all of them who is right, and why.
@@ -24,10 +24,12 @@ import hybrid_rt as hrt
 
 HERE = Path(__file__).resolve().parent
 RESULTS = HERE / "results.csv"
+SUMMARY = HERE.parents[1] / "docs" / "results" / "corpus.md"
 EXPLAINED = HERE / "explained.csv"
 SUFFIXES = (".obj", ".ply", ".stl", ".gltf", ".glb")
 LARGEST = 20 << 20
 COLUMNS = ("collection", "file", "triangles", "area", "bounds", "verdict", "by", "reason")
+VERDICTS = ("agrees", "explained", "differs", "refused")
 CLOSE = 2e-5  # of the area, and of the diagonal: some readers transform in float32
 
 
@@ -113,6 +115,39 @@ def rows(collections, jobs=2):
     return made
 
 
+def counted(made):
+    """Return (collection, files, of each verdict) for each collection."""
+    counts = []
+    for name in dict.fromkeys(row["collection"] for row in made):
+        here = [row["verdict"] for row in made if row["collection"] == name]
+        counts.append((name, len(here), *(here.count(verdict) for verdict in VERDICTS)))
+    return counts
+
+
+def summary(made):
+    """Return the page about a list."""
+    lines = [
+        "# Mesh files of public collections",
+        "",
+        "Every mesh of up to 20 MB in each collection, read by this library and by trimesh, assimp",
+        "and meshio, and compared: triangles, area, bounds. Made by `make corpus` (see",
+        "`tests/corpus/corpus.py`); all files are in `tests/corpus/results.csv`.",
+        "",
+        "| collection | files | " + " | ".join(VERDICTS) + " |",
+        "|---|" + "---:|" * (1 + len(VERDICTS)),
+        *("| " + " | ".join(map(str, row)) + " |" for row in counted(made)),
+        "",
+        "*agrees*: with one of the others at least. *explained*: with none of them, for a reason:",
+        "",
+    ]
+    told = [row for row in made if row["verdict"] == "explained"]
+    lines += [f"- `{row['collection']}/{row['file']}`: {row['reason']}" for row in told]
+    lines += ["", "*refused*, with the reader's own words:", ""]
+    refused = [row for row in made if row["verdict"] == "refused"]
+    lines += [f"- `{row['collection']}/{row['file']}`: {row['reason']}" for row in refused]
+    return "\n".join(lines) + "\n"
+
+
 def main(words):
     """Write the list and a summary; return 1 when a file differs from all readers, unexplained."""
     collections = {name: Path(folder) for name, _, folder in (w.partition("=") for w in words)}
@@ -121,10 +156,10 @@ def main(words):
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()
         writer.writerows(made)
-    verdicts = ("agrees", "explained", "differs", "refused")
-    for name in collections:
-        here = [r["verdict"] for r in made if r["collection"] == name]
-        print(name, len(here), *(f"{v} {here.count(v)}" for v in verdicts))
+    SUMMARY.parent.mkdir(exist_ok=True)
+    SUMMARY.write_text(summary(made))
+    for name, files, *counts in counted(made):
+        print(name, files, *(f"{v} {n}" for v, n in zip(VERDICTS, counts, strict=True)))
     differing = [r for r in made if r["verdict"] == "differs"]
     for row in differing:
         mine = f"{row['triangles']} triangles, area {row['area']}"

@@ -242,15 +242,25 @@ def _joined(lines: bytes) -> bytes:
     if b"\\" not in lines:
         return lines
     text = bytearray(lines)
+    joined, head, remark = -1, b"", False
     for mark in re.finditer(rb"\\ *\n", lines):
-        begin = text.rfind(b"\n", 0, mark.start()) + 1
-        statement = bytes(text[begin : mark.start()])
-        head = statement.split(None, 1)[:1]
-        if head and head[0] in _TEXT:
-            following = lines[mark.end() : mark.end() + 256].split(b"\n", 1)[0].split(None, 1)[:1]
-            if not following or following[0] in _KEYWORDS or following[0].startswith(b"#"):
-                continue
-        elif b"#" in statement:
+        begin, end = mark.start(), mark.end()
+        if joined < 0 or lines.find(b"\n", joined, begin) >= 0:  # another statement begins
+            joined = lines.rfind(b"\n", 0, begin) + 1
+            head, remark = _first(lines, joined, begin), False
+        remark = remark or lines.find(b"#", joined, begin) >= 0
+        following = _first(lines, end, len(lines))
+        a_name = head in _TEXT and (following in _KEYWORDS or following[:1] in (b"", b"#"))
+        if a_name or (remark and head not in _TEXT):
+            joined = -1
             continue
-        text[mark.start() : mark.end()] = b" " * (mark.end() - mark.start())
+        text[begin:end] = b" " * (end - begin)
+        joined = end
     return bytes(text)
+
+
+def _first(lines: bytes, begin: int, end: int) -> bytes:
+    """Return the first word of a line, empty if it has none."""
+    stop = lines.find(b"\n", begin, end)
+    piece = lines[begin : min(begin + 4096, stop if stop >= 0 else end)]
+    return next(iter(piece.split(None, 1)), b"")

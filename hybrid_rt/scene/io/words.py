@@ -45,9 +45,9 @@ class Words(NamedTuple):
     def of_lines(self) -> tuple[I64, I64]:
         """Return, for each line with words, the index of its first and their number."""
         breaks = np.flatnonzero(self.text == 10)
-        line = np.searchsorted(breaks, self.start)
-        first = np.flatnonzero(np.diff(line, prepend=-1))
-        return first, np.diff(first, append=len(line))
+        first = np.searchsorted(self.start, np.append(0, breaks + 1))
+        length = np.diff(first, append=len(self.start))
+        return first[length > 0], length[length > 0]
 
     def word(self, index: int) -> bytes:
         """Return one word."""

@@ -1,7 +1,8 @@
 """Compressed glTF geometry, decoded by libraries that are extras of this project.
 
-DracoPy wraps Google's decoder, meshoptimizer its author's; both are kept and ship binaries. Who has
-no such files needs neither: ``pip install "hybrid-rt[gltf]"``.
+DracoPy wraps Google's decoder, is kept and ships binaries: ``pip install "hybrid-rt[draco]"``.
+meshoptimizer wraps its author's C++ and is young; pip builds it: ``pip install
+"hybrid-rt[meshopt]"``. Who has no such files needs neither.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from hybrid_rt.scene.io.gltf.tree import At
 
 # The second is the first under its later name.
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-_EXTRA = 'pip install "hybrid-rt[gltf]" reads it'
+_EXTRAS = {"DracoPy": "draco", "meshoptimizer": "meshopt"}
 _DRACO_HEAD = 11  # "DRACO", version, kind, method, flags: bytes
 
 
@@ -24,7 +25,8 @@ def _library(name: str, place: At, extension: str) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError as error:
-        raise place.fault(f"{extension} needs {name}; {_EXTRA}") from error
+        hint = f'pip install "hybrid-rt[{_EXTRAS[name]}]"'
+        raise place.fault(f"{extension} needs {name}: {hint}") from error
 
 
 class Draco:

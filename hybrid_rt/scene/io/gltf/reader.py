@@ -7,9 +7,9 @@ others. What the specification says of geometry is little, and each part has a m
 Read: .gltf and .glb, buffers inside of the file, beside it and in data: uris; all accessors
 (sparse, interleaved, normalised, without a buffer view); triangles, strips and fans; the default
 scene with all transforms; meshes, morphed by their weights, skinned in the pose of the nodes;
-KHR_mesh_quantization, EXT_mesh_gpu_instancing, KHR_node_visibility, and with the extra ``gltf``
-KHR_draco_mesh_compression and EXT_meshopt_compression. Left out: points and lines. Not played:
-animations. Refused: other extensions that a file requires.
+KHR_mesh_quantization, EXT_mesh_gpu_instancing, KHR_node_visibility, and with the extras ``draco``
+and ``meshopt`` KHR_draco_mesh_compression and EXT_meshopt_compression. Left out: points and lines.
+Not played: animations. Refused: other extensions that a file requires.
 
 Each primitive of each instance is an object. A mirrored instance keeps the order of its corners.
 """

@@ -1,4 +1,4 @@
-"""Compressed glTF is read where the libraries of the extra `gltf` are, and refused by name else."""
+"""Compressed glTF is read where the libraries of its extras are, and refused by name else."""
 
 import sys
 
@@ -115,8 +115,11 @@ def test_broken_meshopt_is_named(tmp_path, key):
     refused(g.write(tmp_path / "m.glb"), "EXT_meshopt_compression", WRONG[key][1])
 
 
-@pytest.mark.parametrize(("library", "make"), [("DracoPy", draco), ("meshoptimizer", meshopt)])
-def test_without_the_library_it_is_named(tmp_path, monkeypatch, library, make):
+@pytest.mark.parametrize(
+    ("library", "extra", "make"),
+    [("DracoPy", "draco", draco), ("meshoptimizer", "meshopt", meshopt)],
+)
+def test_without_the_library_it_is_named(tmp_path, monkeypatch, library, extra, make):
     path = make().write(tmp_path / "m.glb")
     monkeypatch.setitem(sys.modules, library, None)
-    refused(path, f"needs {library}", 'pip install "hybrid-rt[gltf]"')
+    refused(path, f'needs {library}: pip install "hybrid-rt[{extra}]"')
