@@ -17,15 +17,16 @@ _READ = {
     "EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_node_visibility",
 }  # fmt: skip
 _HARMLESS = {
-    "KHR_lights_punctual", "EXT_lights_image_based", "EXT_lights_ies", "KHR_texture_transform",
-    "KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds",
     "MSFT_packing_normalRoughnessMetallic", "MSFT_packing_occlusionRoughnessMetallic",
     "KHR_xmp", "KHR_xmp_json_ld", "KHR_animation_pointer", "KHR_techniques_webgl",
     "KHR_technique_webgl",
     "KHR_node_hoverability", "KHR_node_selectability", "EXT_mesh_features",
     "EXT_structural_metadata", "EXT_mesh_manifold", "ADOBE_materials_thin_transparency",
-    "GODOT_single_root", "EXT_texture_procedurals",
+    "GODOT_single_root",
 }  # fmt: skip
+_LOOKS = tuple(
+    f"{who}_{what}" for who in ("KHR", "EXT", "MSFT") for what in ("materials", "texture", "lights")
+)
 
 
 def open_file(path: Path, data: bytes) -> tuple[At, bytes | None]:
@@ -50,7 +51,7 @@ def open_file(path: Path, data: bytes) -> tuple[At, bytes | None]:
     unknown = [
         name.text()
         for name in tree.all("extensionsRequired")
-        if not (name.text() in _READ | _HARMLESS or name.text().startswith("KHR_materials_"))
+        if not (name.text() in _READ | _HARMLESS or name.text().startswith(_LOOKS))
     ]
     if unknown:
         raise FormatError(
