@@ -28,7 +28,17 @@ SUMMARY = HERE.parents[1] / "docs" / "results" / "corpus.md"
 EXPLAINED = HERE / "explained.csv"
 SUFFIXES = (".obj", ".ply", ".stl", ".gltf", ".glb")
 LARGEST = 20 << 20
-COLUMNS = ("collection", "file", "triangles", "area", "bounds", "verdict", "by", "reason")
+COLUMNS = (
+    "collection",
+    "file",
+    "triangles",
+    "area",
+    "bounds",
+    "verdict",
+    "by",
+    "against",
+    "reason",
+)
 VERDICTS = ("agrees", "explained", "differs", "refused")
 CLOSE = 2e-5  # of the area, and of the diagonal: some readers transform in float32
 
@@ -89,6 +99,8 @@ def compare(name, folder, path, explained):
     }
     others = {reader: another(reader, path) for reader in second.READERS}
     agree = [reader for reader, found in others.items() if same(mine, found)]
+    differ = {r: f for r, f in others.items() if r not in agree and "error" not in f}
+    row["against"] = "; ".join(f"{reader}: {brief(found)}" for reader, found in differ.items())
     if agree:
         return row | {"verdict": "agrees", "by": " ".join(agree)}
     told = explained.get((name, row["file"]))
