@@ -1,7 +1,7 @@
 """Triangles from polygons, of whatever shape.
 
 A polygon with n corners becomes n - 2 triangles around its first corner, as most readers do it,
-wherever these do not overlap; else around its second corner (a quad's other diagonal); else by
+wherever these do not overlap; else around the next corner for which that holds; else by
 `mapbox_earcut`, Mapbox's ear cutting in C++, which is kept and used widely and takes concave
 polygons and holes that a bridge connects to the rim. Earcut promises no right answer, hence its
 triangles count only when their areas add up to the polygon's, the sum of cross products along its
@@ -24,6 +24,7 @@ from hybrid_rt.scene.io.fault import FormatError
 from hybrid_rt.scene.io.words import F64, I64
 
 _BLOCK = 1 << 18  # corners at a time
+_FANS = 12  # corners that are tried as the common one
 # Twice an area that float64 differences leave uncertain, and that coordinates rounded to float32
 # do, in units of (largest coordinate) x (extent of the polygon).
 _SURE = 2.0**-48
@@ -85,15 +86,16 @@ def _alike(
     """Return triangles of polygons with as many corners, and of which polygon each is."""
     n = rims.shape[1]
     points = vertices[rims]
-    fits = np.full(len(rims), -1)
-    for first in (1, 0):
-        fits[_fan_fits(np.roll(points, -first, axis=1))] = first
+    left = np.arange(len(rims))
     found = []
-    for first in (0, 1):
-        chosen = np.flatnonzero(fits == first)
+    for first in range(min(n if n > 4 else 2, _FANS)):  # a quad's other two are the same
+        if len(left) == 0:
+            break
+        fits = _fan_fits(np.roll(points[left], -first, axis=1))
+        chosen, left = left[fits], left[~fits]
         fan = (first + _fan(n)) % n
         found.append((rims[chosen][:, fan].reshape(-1, 3), np.repeat(index[chosen], n - 2)))
-    for k in np.flatnonzero(fits < 0).tolist():
+    for k in left.tolist():
         triangles = _one(points[k])
         if triangles is None:
             raise FormatError(
