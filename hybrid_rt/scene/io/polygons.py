@@ -9,8 +9,8 @@ rim. It leaves out corners that lie on a straight edge.
 
 A polygon need not be plane: corners are judged along the normal that its rim has on average
 (Newell). One without area, all corners on a line, becomes triangles without area. One that
-crosses itself, or is bent so far that it does seen along its normal, or goes around twice, has no
-inside that files define, and is refused.
+crosses itself or goes around twice has no inside that files define, and is refused; so is one of
+five or more corners that is concave and far from plane, of which every reader makes another surface.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from hybrid_rt.scene.io.fault import FormatError
 from hybrid_rt.scene.io.words import F64, I64
 
 _BLOCK = 1 << 18  # corners at a time
+_BENT = 0.1  # distance from the mean plane, in units of the polygon's extent
 _FANS = 12  # corners that are tried as the common one
 # Twice an area that float64 differences leave uncertain, and that coordinates rounded to float32
 # do, in units of (largest coordinate) x (extent of the polygon).
@@ -91,6 +92,8 @@ def _alike(
     for first in range(min(n if n > 4 else 2, _FANS)):  # a quad's other two are the same
         if len(left) == 0:
             break
+        if first == 1 and n > 4:
+            _refuse_bent(points[left], index[left], where)
         fits = _fan_fits(np.roll(points[left], -first, axis=1))
         chosen, left = left[fits], left[~fits]
         fan = (first + _fan(n)) % n
@@ -103,6 +106,20 @@ def _alike(
             )
         found.append((rims[k][triangles], np.full(len(triangles), index[k])))
     return found
+
+
+def _refuse_bent(points: F64, index: I64, where: Callable[[int], str]) -> None:
+    """Raise for the first polygon (P, n, 3) that is far from plane: its triangles are a guess."""
+    rim = points - points.mean(axis=1, keepdims=True)
+    normal = np.cross(rim, np.roll(rim, -1, axis=1)).sum(axis=1)
+    length = np.linalg.norm(normal, axis=1)
+    away = np.abs(np.einsum("pkc,pc->pk", rim, normal)).max(axis=1)
+    bent = away > _BENT * length * np.abs(rim).max(axis=(1, 2))
+    bent &= length > _doubt(points, _ROUNDED)  # else there is no plane to speak of
+    if bent.any():
+        k = int(np.argmax(bent))
+        what = f"a polygon of {points.shape[1]} corners that is concave and far from plane"
+        raise FormatError(f"{where(int(index[k]))}: {what}")
 
 
 def _fan(n: int) -> I64:
