@@ -10,7 +10,8 @@ rim. It leaves out corners that lie on a straight edge.
 A polygon need not be plane: corners are judged along the normal that its rim has on average
 (Newell). One without area, all corners on a line, becomes triangles without area. One that
 crosses itself or goes around twice has no inside that files define, and is refused; so is one of
-five or more corners that is concave and far from plane, of which every reader makes another surface.
+five or more corners that is concave and far from plane, of which every reader makes another
+surface.
 """
 
 from __future__ import annotations
