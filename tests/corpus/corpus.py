@@ -5,8 +5,9 @@ public repository, such as mikedh/trimesh or assimp/assimp. The list goes to
 ``tests/corpus/results.csv``, a summary to ``docs/results/corpus.md``; the meshes themselves are
 never kept here. Needs the extras ``corpus``, ``draco`` and ``meshopt``.
 
-A file agrees when the triangles, the area and the bounds are those of one other reader at least.
-``explained.csv`` says of the files that differ from all of them who is right, and why.
+A file agrees when the triangles, the area and the bounds are those of one other reader at least, and
+of all that read it: where one differs, ``explained.csv`` says who is right, and why; else the file
+counts as differing.
 """
 
 import csv
@@ -101,13 +102,15 @@ def compare(name, folder, path, explained):
     agree = [reader for reader, found in others.items() if same(mine, found)]
     differ = {r: f for r, f in others.items() if r not in agree and "error" not in f}
     row["against"] = "; ".join(f"{reader}: {brief(found)}" for reader, found in differ.items())
-    if agree:
-        return row | {"verdict": "agrees", "by": " ".join(agree)}
-    told = explained.get((name, row["file"]))
-    if told:
-        return row | {"verdict": "explained", "reason": told}
+    told = explained.get((name, row["file"]), "")
+    if told or not differ:
+        row["reason"] = told if differ or not agree else ""
+        if agree:
+            return row | {"verdict": "agrees", "by": " ".join(agree)}
+        if told:
+            return row | {"verdict": "explained"}
     said = "; ".join(f"{reader}: {brief(found)}" for reader, found in others.items())
-    return row | {"verdict": "differs", "reason": said}
+    return row | {"verdict": "differs", "by": " ".join(agree), "reason": said}
 
 
 def explanations():
@@ -149,10 +152,11 @@ def summary(made):
         "|---|" + "---:|" * (1 + len(VERDICTS)),
         *("| " + " | ".join(map(str, row)) + " |" for row in counted(made)),
         "",
-        "*agrees*: with one of the others at least. *explained*: with none of them, for a reason:",
+        "*agrees*: with one of the others at least. *explained*: with none of them, for a reason.",
+        "These are the reasons, and those why one of the others differs where another agrees:",
         "",
     ]
-    told = [row for row in made if row["verdict"] == "explained"]
+    told = [row for row in made if row["verdict"] != "refused" and row["reason"]]
     lines += [f"- `{row['collection']}/{row['file']}`: {row['reason']}" for row in told]
     lines += ["", "*refused*, with the reader's own words:", ""]
     refused = [row for row in made if row["verdict"] == "refused"]
