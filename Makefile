@@ -4,6 +4,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+# Files of tests are shared out among so many processes; a kernel's threads wait without spinning.
+JOBS ?= 2
+PYTEST := $(BIN)/pytest -n $(JOBS) --dist loadfile
 
 .PHONY: help report quick test lint types contracts fast unit mutation oldest fuzz corpus clean
 
@@ -41,13 +44,13 @@ contracts: $(STAMP)
 	$(BIN)/lint-imports
 
 fast: $(STAMP)
-	$(BIN)/pytest -m "not slow"
+	$(PYTEST) -m "not slow"
 
 unit: $(STAMP)
-	$(BIN)/pytest
+	$(PYTEST)
 
 mutation: $(STAMP)
-	$(BIN)/python tests/mutation/guards.py --jobs 2
+	$(BIN)/python tests/mutation/guards.py --jobs $(JOBS)
 
 oldest: $(STAMP)
 	$(BIN)/python tests/oldest/oldest.py

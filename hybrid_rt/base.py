@@ -181,7 +181,7 @@ class Technique(abc.ABC):
     """Whatever reads a screen: a frozen dataclass of parameters, each with a default.
 
     A technique of one's own gives `name` and `description`, `_march`, and `_read` if it reads more
-    than the G-buffer; `docs/techniques.md` has one of thirty lines. `register` makes it known by
+    than the G-buffer; `docs/techniques.md` has a complete one. `register` makes it known by
     its name.
 
     Attributes

@@ -99,6 +99,18 @@ class Judged:
     reference_wrong: Bool
     pixel_tolerance: float
 
+    def __post_init__(self) -> None:
+        verdict = _check.array("verdict", self.verdict, ("N",), np.uint8)
+        _check.in_range("verdict", verdict, 0, len(Verdict) - 1, "of Verdict")
+        _check.real("pixel_tolerance", self.pixel_tolerance, above=0.0)
+        object.__setattr__(self, "verdict", verdict)
+        for name, dtype in (
+            ("error_t", np.float64), ("error_px", np.float64), ("reference_wrong", np.bool_),
+        ):  # fmt: skip
+            value = _check.array(name, getattr(self, name), ("N",), dtype)
+            _check.same_length(name, value, "verdict", len(verdict))
+            object.__setattr__(self, name, value)
+
     def __len__(self) -> int:
         return len(self.verdict)
 

@@ -27,6 +27,12 @@ class Rate:
     low: float
     high: float
 
+    def __post_init__(self) -> None:
+        _check.integer("total", self.total, least=0, most=2**63 - 1)
+        _check.integer("count", self.count, least=0, most=int(self.total))
+        _check.fraction("low", self.low)
+        _check.fraction("high", self.high)
+
     @classmethod
     def of(cls, count: int, total: int) -> Rate:
         """Return the rate of `count` in `total`."""

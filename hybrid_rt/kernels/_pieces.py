@@ -41,7 +41,8 @@ class _Lowering(typed_passes.NativeLowering):
         entry = object()  # callers know a function by this
         state["cr"] = state["cr"]._replace(cfunc=entry)
         state.targetctx.insert_user_function(entry, state["cr"].fndesc, [state.library])
-        state.reload_init.extend(state.library._reload_init)
+        # The oldest versions of Numba keep none.
+        state.reload_init.extend(getattr(state.library, "_reload_init", ()))
         return True
 
 

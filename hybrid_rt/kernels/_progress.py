@@ -90,11 +90,7 @@ _callback: Callable[[Compiling], Any] | None = None
 
 
 def on_compile(callback: Callable[[Compiling], Any] | None) -> None:
-    """Have `callback` called whenever a function is about to be compiled; None: the library's own.
-
-    The library's own writes a line to the standard error when a stage begins that takes more than a
-    second, unless the environment variable HYBRID_RT_COMPILE_NOTES is 0.
-    """
+    """Do what `hybrid_rt.compiling.on_compile` says."""
     global _callback
     _callback = callback
 

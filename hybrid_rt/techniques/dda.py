@@ -74,4 +74,4 @@ class PixelDDA(Technique):
             float(self.jitter),
             int(self.max_steps or camera.width + camera.height + 2),
         )
-        return stepping.march(rays, screen, (), 1, numbers, threads)
+        return stepping.march(rays, screen, None, numbers, threads)

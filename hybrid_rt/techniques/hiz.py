@@ -123,5 +123,4 @@ class HiZ(Technique):
             bool(self.trace_background),
             int(self.max_steps),
         )
-        pyramid = screen.data
-        return stepping.march(rays, screen, pyramid.arrays, len(pyramid), numbers, threads)
+        return stepping.march(rays, screen, screen.data, numbers, threads)

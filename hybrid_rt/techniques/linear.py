@@ -84,7 +84,7 @@ class Linear(Technique):
         numbers = LinearNumbers(
             thickness, float(self.stride), int(self.refinements), int(self.max_steps)
         )
-        return stepping.march(rays, screen, (), 1, numbers, threads)
+        return stepping.march(rays, screen, None, numbers, threads)
 
 
 def _label(linear: Linear) -> str:

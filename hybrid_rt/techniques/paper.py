@@ -56,5 +56,4 @@ class Paper(stepping.Sampled):
 
     def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
         numbers = PaperNumbers(*self._budgets(screen.camera))
-        pyramid = screen.data
-        return stepping.march(rays, screen, pyramid.arrays, len(pyramid), numbers, threads)
+        return stepping.march(rays, screen, screen.data, numbers, threads)

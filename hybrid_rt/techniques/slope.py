@@ -54,5 +54,4 @@ class SlopeAware(stepping.Sampled):
 
     def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
         numbers = SlopeNumbers(*self._budgets(screen.camera))
-        pyramid = screen.data
-        return stepping.march(rays, screen, pyramid.arrays, len(pyramid), numbers, threads)
+        return stepping.march(rays, screen, screen.data, numbers, threads)

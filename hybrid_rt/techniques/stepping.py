@@ -11,6 +11,7 @@ from hybrid_rt import _check, _threads
 from hybrid_rt.base import Point, Screen, Technique
 from hybrid_rt.camera.pinhole import Camera
 from hybrid_rt.kernels.techniques import driver
+from hybrid_rt.raster.pyramid import Pyramid
 from hybrid_rt.rays.marched import Marched
 from hybrid_rt.rays.rays import Rays
 from hybrid_rt.scene.mesh import Scene
@@ -83,17 +84,19 @@ class Sampled(Technique):
 
 
 def march(
-    rays: Rays, screen: Screen, pyramid: Any, levels: int, numbers: Any, threads: int | None
+    rays: Rays, screen: Screen, pyramid: Pyramid | None, numbers: Any, threads: int | None
 ) -> Marched:
     """Return what a kernel of `kernels.techniques.driver` says about each ray.
 
-    `pyramid`: `PyramidArrays`, or () for a technique that reads none; `numbers`: its parameters.
+    `pyramid`: what it goes through, None for the depth buffer alone; `numbers`: its parameters.
     """
     marched = Marched.unfilled(len(rays))
     with _threads.limited(threads) as workers:
-        steps_by_level = np.zeros((workers, levels), np.int64)
+        steps_by_level = np.zeros((workers, 1 if pyramid is None else len(pyramid)), np.int64)
         driver.march(
-            rays.arrays, screen.camera.arrays, screen.gbuffer.arrays, pyramid, numbers,
-            marched.arrays, steps_by_level,
+            rays.arrays, screen.camera.arrays, screen.gbuffer.arrays,
+            () if pyramid is None else pyramid.arrays, numbers, marched.arrays, steps_by_level,
         )  # fmt: skip
+    if pyramid is None:  # every sample is of the depth buffer itself
+        steps_by_level[0, 0] = marched.steps.sum(dtype=np.int64)
     return replace(marched, steps_by_level=steps_by_level.sum(axis=0))

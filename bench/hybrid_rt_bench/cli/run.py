@@ -79,7 +79,7 @@ def run(
     picked = {o.parameter: values[o.parameter] for o in _options(kind, values) if not o.changes}
     if changes:
         spec = spec.overridden(**changes)
-    outcome = _measured(kind, spec, threads=threads, out=out_dir, **picked)
+    outcome = _measured(kind, spec, threads, out_dir, picked)
     summary: dict[str, Any] = {
         "run": outcome.folder.name,
         "folder": str(outcome.folder),
@@ -170,13 +170,17 @@ def _values(kind: Kind, given: dict[str, str | int | None]) -> dict[str, Any]:
     return found
 
 
-def _measured(kind: Kind, spec: AnyExperiment, **arguments: Any) -> Outcome:
+def _measured(
+    kind: Kind, spec: AnyExperiment, threads: int | None, out: Path, picks: dict[str, list[str]]
+) -> Outcome:
     from hybrid_rt_bench.measure.progress import Reporter
 
     reporter = Reporter(terminal.err())
     with reporter:
         reporter.begin(f"{spec.name}: loading the compiler and Embree")
-        return kind.runner()(spec, reporter=reporter, command=sys.argv[1:], **arguments)
+        from hybrid_rt_bench.measure.lifecycle import Request
+
+        return kind.runner()(spec, Request(reporter, threads, out, sys.argv[1:], picks))
 
 
 def _said(outcome: Outcome) -> int:

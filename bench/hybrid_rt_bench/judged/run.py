@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import hybrid_rt as hrt
@@ -14,18 +13,17 @@ from hybrid_rt_bench.judged import cell as judged_cell
 from hybrid_rt_bench.judged.columns import EMBREE, SCHEMA
 from hybrid_rt_bench.judged.spec import JudgedExperiment, Which, WorkloadEntry
 from hybrid_rt_bench.measure import compiling
-from hybrid_rt_bench.measure import environment as env
 from hybrid_rt_bench.measure.errors import CellError
 from hybrid_rt_bench.measure.experiment import Resolution
 from hybrid_rt_bench.measure.lifecycle import (
     Outcome,
+    Request,
     Session,
     carry_out,
     cell_keys,
 )
 from hybrid_rt_bench.measure.loaded import LoadedScene, prepare
-from hybrid_rt_bench.measure.plan import PlannedScene, make_plan
-from hybrid_rt_bench.measure.progress import Reporter
+from hybrid_rt_bench.measure.plan import PlannedScene
 from hybrid_rt_bench.measure.queries import query_of
 from hybrid_rt_bench.measure.screens import Screens, points_of
 from hybrid_rt_bench.measure.workloads import Workload, get_workload
@@ -63,41 +61,17 @@ class PlannedCell:
         return judged + (rounds * (judged + 2 * self.rivals) if self.timed else 0)
 
 
-def run_judged(
-    experiment: JudgedExperiment,
-    *,
-    reporter: Reporter,
-    scenes: Sequence[str] | None = None,
-    cameras: Sequence[str] | None = None,
-    threads: int | None = None,
-    out: Path = Path("reports"),
-    command: Sequence[str] = (),
-) -> Outcome:
-    """Measure an experiment that judges and write its folder.
-
-    Parameters
-    ----------
-    experiment : JudgedExperiment
-    reporter : Reporter
-    scenes, cameras : sequence of str, optional
-        See `hybrid_rt_bench.measure.plan.make_plan`.
-    threads, out, command, returns, raises
-        See `hybrid_rt_bench.measure.lifecycle.carry_out`.
-    """
-    workers = env.checked_threads(threads)
+def run_judged(experiment: JudgedExperiment, request: Request) -> Outcome:
+    """Measure an experiment that judges and write its folder."""
     techniques = {name: hrt.TECHNIQUES[name] for name in experiment.techniques}
     for entry in experiment.workloads:
         get_workload(entry.name)
-    reporter.doing("reading scenes")
     return carry_out(
         experiment,
-        make_plan(experiment, scenes, cameras),
+        request,
+        request.plan(experiment),
         SCHEMA,
-        reporter=reporter,
-        threads=workers,
-        out=out,
-        command=command,
-        stages=lambda: stages_to_compile(experiment, techniques, workers),
+        stages=lambda: stages_to_compile(experiment, techniques, request.workers),
         measure_all=lambda session: _Run(experiment, techniques, session).measure(),
     )
 

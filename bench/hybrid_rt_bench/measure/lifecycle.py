@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,9 +13,9 @@ import hybrid_rt as hrt
 from hybrid_rt_bench.measure import compiling, memory
 from hybrid_rt_bench.measure import environment as env
 from hybrid_rt_bench.measure.errors import reason_of
-from hybrid_rt_bench.measure.experiment import AnyExperiment, Resolution
+from hybrid_rt_bench.measure.experiment import AnyExperiment, Resolution, SceneExperiment
 from hybrid_rt_bench.measure.loaded import LoadedScene, prepare
-from hybrid_rt_bench.measure.plan import Plan, PlannedScene
+from hybrid_rt_bench.measure.plan import Plan, PlannedScene, make_plan
 from hybrid_rt_bench.measure.progress import Reporter
 from hybrid_rt_bench.results import statistics as stats
 from hybrid_rt_bench.results.files import ReportsError
@@ -175,15 +175,46 @@ class Session:
         )
 
 
+@dataclass(frozen=True)
+class Request:
+    """What is asked of a run besides its experiment.
+
+    Attributes
+    ----------
+    reporter : Reporter
+    threads : int, optional
+        For every stage alike. Default: all that Numba has.
+    out : Path
+        Directory of the run's folder.
+    command : sequence of str
+        The command line, to be kept.
+    picks : mapping of str to sequence of str
+        What stands in place of the experiment's, by option: "scenes", "cameras", "cases".
+    """
+
+    reporter: Reporter
+    threads: int | None = None
+    out: Path = Path("reports")
+    command: Sequence[str] = ()
+    picks: Mapping[str, Sequence[str]] = field(default_factory=dict)
+
+    @property
+    def workers(self) -> int:
+        """The number of threads, found to be possible."""
+        return env.checked_threads(self.threads)
+
+    def plan(self, experiment: SceneExperiment) -> Plan:
+        """Return which scenes and cameras to measure; see `hybrid_rt_bench.measure.plan`."""
+        self.reporter.doing("reading scenes")
+        return make_plan(experiment, self.picks.get("scenes"), self.picks.get("cameras"))
+
+
 def carry_out(
     experiment: AnyExperiment,
+    request: Request,
     plan: Plan,
     schema: Schema,
     *,
-    reporter: Reporter,
-    threads: int,
-    out: Path,
-    command: Sequence[str],
     stages: Callable[[], compiling.Stages],
     measure_all: Callable[[Session], None],
 ) -> Outcome:
@@ -192,16 +223,10 @@ def carry_out(
     Parameters
     ----------
     experiment : AnyExperiment
+    request : Request
     plan : Plan
     schema : Schema
         The columns of the run's results.
-    reporter : Reporter
-    threads : int
-        For every stage alike.
-    out : Path
-        Directory of the run's folder.
-    command : sequence of str
-        The command line, to be kept.
     stages : callable
         Returns what is to be compiled before anything is timed.
     measure_all : callable
@@ -215,19 +240,20 @@ def carry_out(
     Raises
     ------
     ArgumentError
-        `out` cannot be written to.
+        The directory of runs cannot be written to.
     ReportsError
         The folder can no longer be written to.
     """
+    reporter, threads = request.reporter, request.workers
     for note in plan.notes:
         reporter.say(note, "yellow")
     writer = create_run(
-        out,
+        request.out,
         experiment.name,
         schema,
         {
             "kind": experiment.kind,
-            "command": list(command),
+            "command": list(request.command),
             "spec": experiment.model_dump(mode="json", by_alias=True),
             "notes": plan.notes,
             "warnings": [],

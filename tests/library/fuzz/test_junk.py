@@ -42,7 +42,8 @@ def test_most_junk_is_refused(ended):
 
 
 RESULTS = (
-    "HybridResult", "Judged", "MarchWork", "Marched", "Nearest", "OcclusionResult", "Rate",
+    "Compiling", "HybridResult", "Judged", "MarchWork", "Marched", "Nearest", "OcclusionResult",
+    "Rate",
 )  # fmt: skip
 """Records that the library makes of what it has found, and nobody hands back to it unchecked."""
 

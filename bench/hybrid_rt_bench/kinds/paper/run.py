@@ -2,71 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
-
 import hybrid_rt as hrt
 from hybrid_rt_bench.kinds.paper import cell
 from hybrid_rt_bench.kinds.paper.columns import SCHEMA
 from hybrid_rt_bench.kinds.paper.spec import PaperExperiment
-from hybrid_rt_bench.measure import environment as env
 from hybrid_rt_bench.measure.experiment import Resolution
-from hybrid_rt_bench.measure.lifecycle import Outcome, Session, carry_out, cell_keys
+from hybrid_rt_bench.measure.lifecycle import Outcome, Request, Session, carry_out, cell_keys
 from hybrid_rt_bench.measure.loaded import LoadedScene
-from hybrid_rt_bench.measure.plan import PlannedScene, make_plan
-from hybrid_rt_bench.measure.progress import Reporter
+from hybrid_rt_bench.measure.plan import PlannedScene
 
 
-def run_paper(
-    experiment: PaperExperiment,
-    *,
-    reporter: Reporter,
-    scenes: Sequence[str] | None = None,
-    cameras: Sequence[str] | None = None,
-    threads: int | None = None,
-    out: Path = Path("reports"),
-    command: Sequence[str] = (),
-) -> Outcome:
-    """Measure an experiment and write its folder.
-
-    Parameters
-    ----------
-    experiment : PaperExperiment
-    reporter : Reporter
-    scenes, cameras : sequence of str, optional
-        See `hybrid_rt_bench.measure.plan.make_plan`.
-    threads : int, optional
-        For every stage alike. Default: all that Numba has.
-    out : Path
-        Directory of the run's folder.
-    command : sequence of str
-        The command line, to be kept.
-
-    Returns
-    -------
-    Outcome
-        Ctrl-C is no exception: finished cells are kept, and the outcome says `interrupted`.
-
-    Raises
-    ------
-    UnknownNameError, ArgumentError, MeshFileError, NothingToRunError
-        Before anything is measured.
-    ReportsError
-        The folder can no longer be written to.
-    """
-    workers = env.checked_threads(threads)
+def run_paper(experiment: PaperExperiment, request: Request) -> Outcome:
+    """Measure an experiment of kind "paper" and write its folder."""
     techniques = [hrt.TECHNIQUES[name]() for name in experiment.techniques]
-    reporter.doing("reading scenes")
-    plan = make_plan(experiment, scenes, cameras)
+    plan = request.plan(experiment)
     return carry_out(
         experiment,
+        request,
         plan,
         SCHEMA,
-        reporter=reporter,
-        threads=workers,
-        out=out,
-        command=command,
-        stages=lambda: cell.stages_to_compile(experiment, techniques, workers),
+        stages=lambda: cell.stages_to_compile(experiment, techniques, request.workers),
         measure_all=lambda session: _Run(experiment, techniques, session).measure(),
     )
 

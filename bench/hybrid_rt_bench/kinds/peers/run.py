@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import hybrid_rt as hrt
@@ -17,50 +15,25 @@ from hybrid_rt_bench.kinds.peers.programs.ours import Embree
 from hybrid_rt_bench.kinds.peers.spec import PeersExperiment
 from hybrid_rt_bench.kinds.peers.trial import Trial, attempt
 from hybrid_rt_bench.measure import compiling
-from hybrid_rt_bench.measure import environment as env
 from hybrid_rt_bench.measure.errors import CellError, reason_of
 from hybrid_rt_bench.measure.experiment import Resolution
-from hybrid_rt_bench.measure.lifecycle import Outcome, Session, carry_out, cell_keys
-from hybrid_rt_bench.measure.plan import PlannedScene, make_plan
-from hybrid_rt_bench.measure.progress import Reporter
+from hybrid_rt_bench.measure.lifecycle import Outcome, Request, Session, carry_out, cell_keys
+from hybrid_rt_bench.measure.plan import PlannedScene
 
 
-def run_peers(
-    experiment: PeersExperiment,
-    *,
-    reporter: Reporter,
-    scenes: Sequence[str] | None = None,
-    cameras: Sequence[str] | None = None,
-    threads: int | None = None,
-    out: Path = Path("reports"),
-    command: Sequence[str] = (),
-) -> Outcome:
+def run_peers(experiment: PeersExperiment, request: Request) -> Outcome:
     """Measure an experiment of kind "peers" and write its folder.
 
     A peer that cannot be imported, crashes, takes too long or raises has a row with the reason,
     which is no failure of the run.
-
-    Parameters
-    ----------
-    experiment : PeersExperiment
-    reporter : Reporter
-    scenes, cameras : sequence of str, optional
-        See `hybrid_rt_bench.measure.plan.make_plan`.
-    threads, out, command, returns, raises
-        See `hybrid_rt_bench.measure.lifecycle.carry_out`.
     """
-    workers = env.checked_threads(threads)
     chosen = [get_peer(name) for name in dict.fromkeys(experiment.peers)]
-    reporter.doing("reading scenes")
     return carry_out(
         experiment,
-        make_plan(experiment, scenes, cameras),
+        request,
+        request.plan(experiment),
         SCHEMA,
-        reporter=reporter,
-        threads=workers,
-        out=out,
-        command=command,
-        stages=lambda: stages_to_compile(chosen, workers),
+        stages=lambda: stages_to_compile(chosen, request.workers),
         measure_all=lambda session: _Run(experiment, chosen, session).measure(),
     )
 

@@ -2,54 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
-
 import hybrid_rt_scenes as hrs
 from hybrid_rt_bench.kinds.roofline import cell, rates
 from hybrid_rt_bench.kinds.roofline.columns import SCHEMA
 from hybrid_rt_bench.kinds.roofline.spec import RooflineExperiment
 from hybrid_rt_bench.measure import compiling
-from hybrid_rt_bench.measure import environment as env
 from hybrid_rt_bench.measure.experiment import Resolution
-from hybrid_rt_bench.measure.lifecycle import Outcome, Session, carry_out, cell_keys
+from hybrid_rt_bench.measure.lifecycle import Outcome, Request, Session, carry_out, cell_keys
 from hybrid_rt_bench.measure.loaded import LoadedScene, prepare
-from hybrid_rt_bench.measure.plan import PlannedScene, make_plan
-from hybrid_rt_bench.measure.progress import Reporter
+from hybrid_rt_bench.measure.plan import PlannedScene
 
 
-def run_roofline(
-    experiment: RooflineExperiment,
-    *,
-    reporter: Reporter,
-    scenes: Sequence[str] | None = None,
-    cameras: Sequence[str] | None = None,
-    threads: int | None = None,
-    out: Path = Path("reports"),
-    command: Sequence[str] = (),
-) -> Outcome:
-    """Measure an experiment of kind "roofline" and write its folder.
-
-    Parameters
-    ----------
-    experiment : RooflineExperiment
-    reporter : Reporter
-    scenes, cameras : sequence of str, optional
-        See `hybrid_rt_bench.measure.plan.make_plan`.
-    threads, out, command, returns, raises
-        See `hybrid_rt_bench.measure.lifecycle.carry_out`.
-    """
-    workers = env.checked_threads(threads)
-    reporter.doing("reading scenes")
+def run_roofline(experiment: RooflineExperiment, request: Request) -> Outcome:
+    """Measure an experiment of kind "roofline" and write its folder."""
     return carry_out(
         experiment,
-        make_plan(experiment, scenes, cameras),
+        request,
+        request.plan(experiment),
         SCHEMA,
-        reporter=reporter,
-        threads=workers,
-        out=out,
-        command=command,
-        stages=lambda: stages_to_compile(experiment, workers),
+        stages=lambda: stages_to_compile(experiment, request.workers),
         measure_all=lambda session: _Run(experiment, session).measure(),
     )
 

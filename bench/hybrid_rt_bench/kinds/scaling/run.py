@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,11 +21,9 @@ from hybrid_rt_bench.kinds.scaling.stages import (
     unstable,
     with_sums,
 )
-from hybrid_rt_bench.measure import environment as env
 from hybrid_rt_bench.measure.errors import NothingToRunError
-from hybrid_rt_bench.measure.lifecycle import Outcome, Session, carry_out
+from hybrid_rt_bench.measure.lifecycle import Outcome, Request, Session, carry_out
 from hybrid_rt_bench.measure.plan import Plan, find_scene, size_text
-from hybrid_rt_bench.measure.progress import Reporter
 
 FEW_THREADS = 8
 """Up to so many threads every number is measured, beyond them about three in each doubling."""
@@ -145,55 +141,22 @@ class _Live:
     took: float = 0.0
 
 
-def run_scaling(
-    experiment: ScalingExperiment,
-    *,
-    reporter: Reporter,
-    series: Sequence[str] | None = None,
-    triangles: Sequence[str] | None = None,
-    threads: int | None = None,
-    out: Path = Path("reports"),
-    command: Sequence[str] = (),
-) -> Outcome:
+def run_scaling(experiment: ScalingExperiment, request: Request) -> Outcome:
     """Measure an experiment of kind "scaling" and write its folder.
 
-    Parameters
-    ----------
-    experiment : ScalingExperiment
-    reporter : Reporter
-    series, triangles : sequence of str, optional
-        See `ScalingExperiment.picked`.
-    threads : int, optional
-        For all stages of the cells of other axes, and the most on the axis "threads".
-    out, command
-        As in `hybrid_rt_bench.measure.lifecycle.run_experiment`.
-
-    Returns
-    -------
-    Outcome
-        Ctrl-C is no exception: the rounds measured so far are kept.
-
-    Raises
-    ------
-    UnknownNameError, ArgumentError, MeshFileError, NothingToRunError
-        Before anything is measured.
-    ReportsError
-        The folder can no longer be written to.
+    Threads are those of the cells of other axes, and the most on the axis "threads". After Ctrl-C
+    the rounds measured so far are kept.
     """
-    workers = env.checked_threads(threads)
-    experiment = experiment.picked(series, triangles)
+    experiment = experiment.picked(request.picks.get("series"), request.picks.get("triangles"))
     for name in experiment.techniques:
         hrt.TECHNIQUES[name]  # refuses an unknown one, with a suggestion
-    planned, notes = plan_series(experiment, workers)
+    planned, notes = plan_series(experiment, request.workers)
 
     return carry_out(
         experiment,
+        request,
         Plan(notes=notes),
         SCHEMA,
-        reporter=reporter,
-        threads=workers,
-        out=out,
-        command=command,
         stages=lambda: scaling_cell.stages_to_compile(planned[0].cells[0].task),
         measure_all=lambda session: _Run(experiment, planned, session).measure(),
     )

@@ -5,8 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import json
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import hybrid_rt as hrt
@@ -14,12 +13,10 @@ from hybrid_rt import TECHNIQUES
 from hybrid_rt_bench.kinds.stability.columns import SCHEMA
 from hybrid_rt_bench.kinds.stability.spec import StabilityExperiment
 from hybrid_rt_bench.measure import compiling
-from hybrid_rt_bench.measure import environment as env
 from hybrid_rt_bench.measure.errors import reason_of
-from hybrid_rt_bench.measure.lifecycle import Outcome, Session, carry_out
+from hybrid_rt_bench.measure.lifecycle import Outcome, Request, Session, carry_out
 from hybrid_rt_bench.measure.loaded import native_path
 from hybrid_rt_bench.measure.plan import Plan
-from hybrid_rt_bench.measure.progress import Reporter
 from hybrid_rt_scenes.hard_cases import (
     BuiltCase,
     CaseResult,
@@ -50,46 +47,23 @@ class Entrant:
     answer: Callable[[BuiltCase], Answers]
 
 
-def run_stability(
-    experiment: StabilityExperiment,
-    *,
-    reporter: Reporter,
-    cases: Sequence[str] | None = None,
-    threads: int | None = None,
-    out: Path = Path("reports"),
-    command: Sequence[str] = (),
-) -> Outcome:
+def run_stability(experiment: StabilityExperiment, request: Request) -> Outcome:
     """Run every entrant over every case and write the run's folder.
 
-    Parameters
-    ----------
-    experiment : StabilityExperiment
-    reporter : Reporter
-    cases : sequence of str, optional
-        In place of the experiment's.
-    threads, out, command, raises
-        See `hybrid_rt_bench.measure.lifecycle.carry_out`.
-
-    Returns
-    -------
-    Outcome
-        `broken` names the cases that a promised technique fails. One that raises an error fails the
-        case; the others go on.
+    `broken` of the outcome names the cases that a promised technique fails. One that raises an
+    error fails the case; the others go on.
     """
-    threads = env.checked_threads(threads)
-    named = cases or experiment.cases or hard_case_names()
+    threads = request.workers
+    named = request.picks.get("cases") or experiment.cases or hard_case_names()
     chosen = [get_hard_case(name) for name in dict.fromkeys(named)]
     techniques = [TECHNIQUES[name]() for name in experiment.techniques or TECHNIQUES]
     entrants = _entrants(experiment, techniques, threads)
     failed_by: dict[str, list[str]] = {}
     outcome = carry_out(
         experiment,
+        request,
         Plan(),
         SCHEMA,
-        reporter=reporter,
-        threads=threads,
-        out=out,
-        command=command,
         stages=lambda: stages_to_compile(entrants),
         measure_all=lambda session: _measure_all(session, chosen, entrants, failed_by),
     )
