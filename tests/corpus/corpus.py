@@ -5,9 +5,9 @@ public repository, such as mikedh/trimesh or assimp/assimp. The list goes to
 ``tests/corpus/results.csv``, a summary to ``docs/results/corpus.md``; the meshes themselves are
 never kept here. Needs the extras ``corpus``, ``draco`` and ``meshopt``.
 
-A file agrees when the triangles, the area and the bounds are those of one other reader at least, and
-of all that read it: where one differs, ``explained.csv`` says who is right, and why; else the file
-counts as differing.
+A file agrees when the triangles, the area and the bounds are those of one other reader at least,
+and of all that read it: where one differs, ``explained.csv`` says who is right, and why; else the
+file counts as differing.
 """
 
 import csv
