@@ -1,9 +1,9 @@
 """Wavefront .obj files.
 
-A reader of our own: trimesh, tinyobjloader and meshio each lose or change one of tabs, relative
-indices, continued lines, faces with and without texture coordinates in one file, the order of
-polygons, concave polygons. Here each statement is read or refused with its line; a million
-triangles take a second or two.
+A reader of our own: trimesh and meshio, the best kept ones, lose or change tabs, relative indices,
+faces with and without texture coordinates in one file, the order of polygons, concave polygons
+(docs/results/corpus.md); the PyPI package of tinyobjloader is of 2019 and does not build any more.
+Here each statement is read or refused with its line, many lines at a time.
 
 Read: v (x y z, with a weight or a colour after it, which triangles do not need), f (and fo, its
 old name). o, g and usemtl begin an object each. Without triangles and left out: l, p. Known and

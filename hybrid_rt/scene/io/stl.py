@@ -1,8 +1,8 @@
 """Stereolithography .stl files, binary and ASCII.
 
-A reader of our own, since the format is one line of NumPy, and trimesh and numpy-stl tell the two
-forms apart by their first word, need a guess of the encoding for names, and read what is left of a
-truncated ASCII file. A binary file is one whose length is what its header says.
+A reader of our own, since the format is one line of NumPy, and trimesh guesses the encoding of
+names by a package that need not be there. A binary file is one whose length is what its header
+says; any other that begins with "solid" and holds no zero byte is text.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Words and numbers of text files, found and parsed many at a time.
 
-Text formats of meshes are regular enough for NumPy: a million triangles take a second or two, and
-every word is checked before it is parsed, so that nothing is read as something else.
+Text formats of meshes are regular enough for NumPy, and every word is checked before it is parsed,
+so that nothing is read as something else.
 """
 
 from __future__ import annotations
