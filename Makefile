@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 JOBS ?= 2
 PYTEST := $(BIN)/pytest -n $(JOBS) --dist loadfile
 
-.PHONY: help report quick test lint types contracts fast unit mutation oldest fuzz clean
+.PHONY: help report quick test lint types contracts fast unit mutation oldest fuzz corpus clean
 
 help:
 	@echo "make report     run the paper experiment in its quick form on the built-in scenes"
@@ -16,7 +16,8 @@ help:
 	@echo "make test       lint, types, import contracts and all tests"
 	@echo "make mutation   take away the guards of the certified proof, one at a time"
 	@echo "make oldest     try everything once with the oldest dependencies that are allowed"
-	@echo "make fuzz       junk at every argument of the public API, all of it"
+	@echo "make fuzz       junk at every argument of the public API, and damaged mesh files, all of it"
+	@echo "make corpus COLLECTIONS='NAME=FOLDER ...'  compare mesh readers over public collections"
 	@echo "make cold-start  seconds that the first picture waits for compilation"
 	@echo "make clean      remove .venv and caches"
 
@@ -55,7 +56,11 @@ oldest: $(STAMP)
 	$(BIN)/python tests/oldest/oldest.py
 
 fuzz: $(STAMP)
-	HYBRID_RT_FUZZ=1 $(BIN)/pytest tests/library/fuzz
+	HYBRID_RT_FUZZ=1 $(BIN)/pytest tests/library/fuzz tests/library/scene/io
+
+corpus: $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[test,corpus,draco,meshopt]"
+	$(BIN)/python tests/corpus/corpus.py $(COLLECTIONS)
 
 clean:
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

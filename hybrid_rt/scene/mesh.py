@@ -8,9 +8,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid_rt import _check
-from hybrid_rt._record import Record
+from hybrid_rt._record import Record, read_only
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels.arrays import F32, F64, I32, SceneArrays
 
@@ -21,6 +22,7 @@ class _Triangles(Record):
     vertices: F32
     faces: I32
     object_id: I32
+    polygon_id: I32
 
     def __post_init__(self) -> None:
         v = _check.owned("vertices", self.vertices, ("V", 3), np.float32)
@@ -34,7 +36,13 @@ class _Triangles(Record):
         else:
             ids = _check.owned("object_id", self.object_id, ("F",), np.int32)
             _check.same_length("object_id", ids, "faces", len(f))
+        if self.polygon_id is None:
+            polygons = np.arange(len(f), dtype=np.int32)
+        else:
+            polygons = _check.owned("polygon_id", self.polygon_id, ("F",), np.int32)
+            _check.same_length("polygon_id", polygons, "faces", len(f))
         self._own(SceneArrays(v, f, ids))
+        object.__setattr__(self, "polygon_id", read_only(polygons))
 
     @property
     def arrays(self) -> SceneArrays:
@@ -44,6 +52,16 @@ class _Triangles(Record):
 
     def __len__(self) -> int:
         return len(self.faces)
+
+
+def _apart(ids: Sequence[I32]) -> tuple[NDArray[np.integer[Any]], int]:
+    """Return ids of several meshes, shifted so that none occurs in two, and how many there are."""
+    shifted, n = [], 0
+    for some in ids:
+        least, most = int(some.min()), int(some.max())
+        shifted.append(some + np.int64(n) if n else some)
+        n += most + 1 if least >= 0 else most - least + 1
+    return np.concatenate(shifted), n
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +76,9 @@ class Mesh(_Triangles):
         Indices into `vertices`, F >= 1; both windings are visible.
     object_id : (F,) int32
         Which object of the source a triangle belongs to; default 0.
+    polygon_id : (F,) int32
+        Which polygon of the source a triangle is part of, so that the halves of a quad stay one;
+        default: each is a polygon of its own.
 
     Raises
     ------
@@ -73,11 +94,14 @@ class Mesh(_Triangles):
     vertices: F32
     faces: I32
     object_id: I32 = None  # type: ignore[assignment]
+    polygon_id: I32 = None  # type: ignore[assignment]
 
     @classmethod
-    def from_arrays(cls, vertices: Any, faces: Any, object_id: Any = None) -> Mesh:
+    def from_arrays(
+        cls, vertices: Any, faces: Any, object_id: Any = None, polygon_id: Any = None
+    ) -> Mesh:
         """Return a mesh from arrays; arguments and errors are those of the class."""
-        return cls(vertices, faces, object_id)
+        return cls(vertices, faces, object_id, polygon_id)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +110,7 @@ class Scene(_Triangles):
 
     Attributes
     ----------
-    vertices, faces, object_id
+    vertices, faces, object_id, polygon_id
         As in `Mesh`, with the same errors.
     name : str
 
@@ -100,6 +124,7 @@ class Scene(_Triangles):
     faces: I32
     object_id: I32 = None  # type: ignore[assignment]
     name: str = "scene"
+    polygon_id: I32 = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         _check.text("name", self.name)
@@ -107,22 +132,28 @@ class Scene(_Triangles):
 
     @classmethod
     def from_arrays(
-        cls, vertices: Any, faces: Any, object_id: Any = None, *, name: str = "scene"
+        cls,
+        vertices: Any,
+        faces: Any,
+        object_id: Any = None,
+        *,
+        name: str = "scene",
+        polygon_id: Any = None,
     ) -> Scene:
         """Return a scene of one mesh; the arguments are those of the class."""
-        return cls(vertices, faces, object_id, name)
+        return cls(vertices, faces, object_id, name, polygon_id)
 
     @classmethod
     def from_meshes(cls, meshes: Sequence[Mesh], *, name: str = "scene") -> Scene:
         """Return a scene that holds `meshes` one after the other.
 
-        Object ids are shifted so that those of different meshes stay apart.
+        Object and polygon ids are shifted so that those of different meshes stay apart.
 
         Raises
         ------
         ArgumentError
-            No mesh, or something else among them; more vertices, triangles or object ids together
-            than int32 can number.
+            No mesh, or something else among them; more vertices, triangles, object or polygon ids
+            together than int32 can number.
         """
         _check.text("name", name)
         if not isinstance(meshes, Sequence) or isinstance(meshes, str | bytes) or not meshes:
@@ -131,26 +162,26 @@ class Scene(_Triangles):
             )
         for mesh in meshes:
             _check.instance("meshes", mesh, Mesh)
-        vertices, faces, ids = [], [], []
-        n_vertices, n_objects = 0, 0
+        vertices, faces = [], []
+        n_vertices = 0
         for mesh in meshes:
-            least, most = int(mesh.object_id.min()), int(mesh.object_id.max())
             vertices.append(mesh.vertices)
             faces.append(mesh.faces + np.int64(n_vertices) if n_vertices else mesh.faces)
-            ids.append(mesh.object_id + np.int64(n_objects) if n_objects else mesh.object_id)
             n_vertices += len(mesh.vertices)
-            n_objects += most + 1 if least >= 0 else most - least + 1
-        if max(n_vertices, n_objects) > np.iinfo(np.int32).max:
+        objects, n_objects = _apart([mesh.object_id for mesh in meshes])
+        polygons, n_polygons = _apart([mesh.polygon_id for mesh in meshes])
+        if max(n_vertices, n_objects, n_polygons) > np.iinfo(np.int32).max:
             raise ArgumentError(
-                "meshes", "vertices and objects that int32 can number",
-                f"{n_vertices} vertices, {n_objects} objects",
+                "meshes", "vertices, objects and polygons that int32 can number",
+                f"{n_vertices} vertices, {n_objects} objects, {n_polygons} polygons",
             )  # fmt: skip
         arrays = SceneArrays(
             np.concatenate(vertices),
             np.concatenate(faces).astype(np.int32, copy=False),
-            np.concatenate(ids).astype(np.int32, copy=False),
+            objects.astype(np.int32, copy=False),
         )
-        return cls._made(arrays, name=name)
+        polygon_id = read_only(polygons.astype(np.int32, copy=False))
+        return cls._made(arrays, name=name, polygon_id=polygon_id)
 
     def same_as(self, other: Scene) -> bool:
         """Return whether `other` has the same triangles in the same order."""

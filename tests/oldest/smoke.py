@@ -27,6 +27,10 @@ def check_meshes(folder):
     names = ("obj", "ply", "glb", "stl", "npz")
     for name in (*(f"ball.{kind}" for kind in names), "ascii.stl", "ascii.ply", "model.gltf"):
         assert len(hrt.load_scene(folder / name)) == len(ball.faces), name
+    corners = ["0 0", "4 0", "4 1", "1 1", "1 4", "0 4"]
+    lines = [f"v {corner} 0" for corner in corners] + ["f 2 3 4 5 6 1"]
+    (folder / "concave.obj").write_text("\n".join(lines))
+    assert len(hrt.load_scene(folder / "concave.obj")) == 4
     outside = folder / "outside.bin"
     outside.write_bytes(bytes(36))
     inner = folder / "inner"

@@ -288,10 +288,10 @@ def test_a_gltf_that_would_lose_its_geometry_silently_is_refused(tmp_path):
 
     rewrite("same.glb")
     assert len(hrt.read_mesh(tmp_path / "same.glb").faces) == 40
-    tree["extensionsUsed"] = ["KHR_draco_mesh_compression"]
-    rewrite("draco.glb")
-    bad(tmp_path / "draco.glb", "KHR_draco_mesh_compression")
-    del tree["extensionsUsed"]
+    tree["extensionsRequired"] = ["ACME_voxels"]
+    rewrite("voxels.glb")
+    bad(tmp_path / "voxels.glb", "requires ACME_voxels")
+    del tree["extensionsRequired"]
     position = tree["meshes"][0]["primitives"][0]["attributes"]["POSITION"]
     tree["accessors"][position]["normalized"] = True
     rewrite("short.glb")

@@ -73,6 +73,20 @@ def test_zero_area_triangles_are_kept_counted_and_never_hit():
     assert set(np.unique(hrt.rasterize(scene, camera).prim_id)) == {-1, 0}
 
 
+def test_polygon_ids_are_each_triangles_own_unless_given():
+    faces = [[0, 1, 2], [2, 1, 0], [1, 2, 0]]
+    assert hrt.Mesh(TRIANGLE, faces).polygon_id.tolist() == [0, 1, 2]
+    mesh = hrt.Mesh(TRIANGLE, faces, polygon_id=[4, 4, 7])
+    assert mesh.polygon_id.dtype == np.int32
+    assert not mesh.polygon_id.flags.writeable
+    joined = hrt.Scene.from_meshes([mesh, hrt.Mesh(TRIANGLE, faces)])
+    assert joined.polygon_id.tolist() == [4, 4, 7, 8, 9, 10]
+    assert hrt.Scene(TRIANGLE, faces, None, "name", [0, 0, 0]).polygon_id.tolist() == [0, 0, 0]
+    for bad in ([0, 0], [0.5, 1, 2], [[0], [1], [2]], [2**31, 0, 0]):
+        with pytest.raises(hrt.ArgumentError, match="polygon_id: expected"):
+            hrt.Scene.from_arrays(TRIANGLE, faces, polygon_id=bad)
+
+
 def test_meshes_are_joined_in_order_with_their_objects_apart():
     one = hrt.Mesh.from_arrays(TRIANGLE, FACES, [2])
     two = hrt.Mesh.from_arrays(TRIANGLE + 5, FACES, [0])
