@@ -61,7 +61,7 @@ MUTANTS = (
            "if n <= length:", "if n < length:", TEST_LISTS),
     Mutant("hidden by the farthest pixel's neighbours", LISTS,
            "return simd.reduce_min(simd.select(there, low, FULL))",
-           "return simd.reduce_max(simd.select(there, low, np.int32(0)))", TEST_LISTS),
+           "return -simd.reduce_min(-simd.select(there, low, np.int32(0)))", TEST_LISTS),
     Mutant("rest not looked at", WALK, "if full and not lowest > rest[cy, cx]:",
            "if full and lowest < F0:", TEST_WALK),
     Mutant("only the first of a list tested", WALK,

@@ -39,7 +39,6 @@ from .across import (
     insert,
     lowest,
     reduce_add,
-    reduce_max,
     reduce_min,
 )
 from .lanewise import (
@@ -51,7 +50,6 @@ from .lanewise import (
     maximum,
     minimum,
     select,
-    sqrt,
     to_f32,
     to_f64,
     to_i32,
@@ -98,11 +96,9 @@ __all__ = [
     "minimum",
     "part",
     "reduce_add",
-    "reduce_max",
     "reduce_min",
     "scatter",
     "select",
-    "sqrt",
     "store",
     "store_masked",
     "store_triples",

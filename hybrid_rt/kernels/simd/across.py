@@ -97,9 +97,6 @@ reduce_add = _reduction("reduce_add", _add, "the sum")
 reduce_min = _reduction(
     "reduce_min", lambda b, x, y: extreme(b, "<", x, y), "the `minimum` (so NaN may be lost)"
 )
-reduce_max = _reduction(
-    "reduce_max", lambda b, x, y: extreme(b, ">", x, y), "the `maximum` (so NaN may be lost)"
-)
 
 
 def _lane(context, builder, value, typ, lanes):

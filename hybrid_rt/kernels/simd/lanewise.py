@@ -71,7 +71,6 @@ absolute = _math(
     "absolute", {"float": "fabs", "int": "abs"}, NUMBERS,
     "Return the absolute value; the least integer stays itself.",
 )  # fmt: skip
-sqrt = _math("sqrt", {"float": "sqrt"}, ("f32", "f64"), "Return the square root, NaN below zero.")
 floor = _math(
     "floor", {"float": "floor"}, ("f32", "f64"), "Return the greatest whole number not above."
 )

@@ -50,11 +50,9 @@ from hybrid_rt.kernels.simd import (  # fmt: skip
     minimum,
     part,
     reduce_add,
-    reduce_max,
     reduce_min,
     scatter,
     select,
-    sqrt,
     store,
     store_masked,
     store_triples,
@@ -137,24 +135,23 @@ def test_float_arithmetic(dtype):
             store(out[5], i, minimum(x, y))
             store(out[6], i, maximum(x, y))
             store(out[7], i, absolute(x))
-            store(out[8], i, sqrt(x))
-            store(out[9], i, floor(x))
-            store(out[10], i, x + s)
-            store(out[11], i, s - x)
-            store(out[12], i, x * 3)
-            store(out[13], i, s / x)
-            store(out[14], i, maximum(x, 0))
-            store(out[15], i, x * y + s)  # stays two roundings
+            store(out[8], i, floor(x))
+            store(out[9], i, x + s)
+            store(out[10], i, s - x)
+            store(out[11], i, x * 3)
+            store(out[12], i, s / x)
+            store(out[13], i, maximum(x, 0))
+            store(out[14], i, x * y + s)  # stays two roundings
 
     a, b = hard_floats(dtype)
     s = 0.1
-    out = np.empty((16, a.size), dtype)
+    out = np.empty((15, a.size), dtype)
     run(a, b, s, out)
     s = dtype(s)
     with np.errstate(all="ignore"):
         wanted = [
             a + b, a - b, a * b, a / b, -a, np.where(a < b, a, b), np.where(a > b, a, b),
-            np.abs(a), np.sqrt(a), np.floor(a), a + s, s - a, a * dtype(3), s / a,
+            np.abs(a), np.floor(a), a + s, s - a, a * dtype(3), s / a,
             np.where(a > 0, a, dtype(0)), a * b + s,
         ]  # fmt: skip
     for got, want in zip(out, wanted, strict=True):
@@ -615,18 +612,13 @@ def test_reductions(dtype):
             v = load(a, i)
             out[0, i // WIDTH] = reduce_add(v)
             out[1, i // WIDTH] = reduce_min(v)
-            out[2, i // WIDTH] = reduce_max(v)
 
     a = (hard_floats if dtype in FLOATS else hard_ints)(dtype)[0].copy()
     np.random.default_rng(17).shuffle(a)
-    out = np.empty((3, a.size // WIDTH), dtype)
+    out = np.empty((2, a.size // WIDTH), dtype)
     run(a, out)
     with np.errstate(all="ignore"):
-        for got, combine in zip(
-            out,
-            (np.add, lambda x, y: np.where(x < y, x, y), lambda x, y: np.where(x > y, x, y)),
-            strict=True,
-        ):
+        for got, combine in zip(out, (np.add, lambda x, y: np.where(x < y, x, y)), strict=True):
             left = a.reshape(-1, WIDTH)
             while left.shape[1] > 1:
                 left = combine(*np.split(left, 2, axis=1))
