@@ -1,8 +1,8 @@
 """Scenes by name: real ones from files, and places generated from code."""
 
+from hybrid_rt_scenes.automatic import automatic_cameras
 from hybrid_rt_scenes.registry import (
     SCENES,
-    automatic_cameras,
     get_scene,
     read_definition,
     register,

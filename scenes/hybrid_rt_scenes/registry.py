@@ -6,12 +6,12 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pydantic import BaseModel, ValidationError
 
 import hybrid_rt as hrt
 from hybrid_rt import _check
 from hybrid_rt.registry import Registry
+from hybrid_rt_scenes.automatic import automatic_cameras
 from hybrid_rt_scenes.spec import CameraSpec, LightsSpec, MeshSpec, SceneSpec
 
 DEFINITIONS = Path(__file__).parent / "definitions"
@@ -122,7 +122,7 @@ def _keys(model: type[BaseModel]) -> list[str]:
 
 
 def scene_from_path(path: str | Path) -> SceneSpec:
-    """Return a scene made of one mesh file, with cameras placed by its bounds.
+    """Return a scene made of one mesh file, with cameras placed by what it shows.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def scene_from_path(path: str | Path) -> SceneSpec:
         title=path.name,
         description=(
             f"{len(scene)} triangles of {path.name}. Its cameras were placed automatically, "
-            "from the bounds alone: four look at it from outside, two stand at its centre."
+            "never inside closed geometry, so that surfaces fill half of each picture at least."
         ),
         needs="It was named by its path.",
         mesh=(MeshSpec(file=str(path.resolve())),),
@@ -150,29 +150,3 @@ def scene_from_path(path: str | Path) -> SceneSpec:
     )
     spec._loaded = scene
     return spec
-
-
-def automatic_cameras(scene: hrt.Scene) -> dict[str, CameraSpec]:
-    """Return six views of a scene chosen from its bounds alone, +Y up.
-
-    Four stand outside at 1.1 times the diagonal (60 degrees then hold the bounding sphere), two at
-    the centre and look along the horizontal axes.
-    """
-    low, high = scene.bounds
-    centre = (low + high) / 2
-    diagonal = float(np.linalg.norm(high - low))
-    if diagonal == 0.0:
-        raise hrt.ArgumentError("scene", "triangles that span some space", "a single point")
-
-    def view(eye: Any, target: Any) -> CameraSpec:
-        return CameraSpec(eye=tuple(eye), target=tuple(target), near=1e-4 * diagonal)
-
-    outside = {"front": (0.0, 0.25, 1.0), "side": (1.0, 0.25, 0.0), "corner": (1.0, 0.6, 1.0)}
-    outside["above"] = (0.2, 1.0, 0.3)
-    views = {}
-    for name, towards in outside.items():
-        direction = np.array(towards) / np.linalg.norm(towards)
-        views[name] = view(centre + 1.1 * diagonal * direction, centre)
-    for name, axis in (("inside_x", (1, 0, 0)), ("inside_z", (0, 0, 1))):
-        views[name] = view(centre, centre + diagonal * np.array(axis))
-    return views

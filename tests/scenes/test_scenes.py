@@ -265,7 +265,7 @@ def test_data_is_found_where_the_variable_says(tmp_path, monkeypatch):
     assert data_directory() == ROOT.parent / "shared" / "scenes"
 
 
-def test_a_file_from_the_command_line_gets_cameras_by_its_bounds(tmp_path, small):
+def test_a_file_from_the_command_line_gets_cameras_that_see_it(tmp_path, small):
     path = tmp_path / "ball.ply"
     scene = small["sphere"]
     trimesh.Trimesh(scene.vertices, scene.faces, process=False).export(path)
@@ -279,12 +279,8 @@ def test_a_file_from_the_command_line_gets_cameras_by_its_bounds(tmp_path, small
     loaded = spec.load()
     np.testing.assert_array_equal(loaded.faces, scene.faces)
     for name in ("front", "side", "corner", "above"):
-        t = first_hits(loaded, spec.camera(name, 64, 64))
-        assert np.isfinite(t).mean() > 0.1
-        corners = np.stack(np.meshgrid(*loaded.bounds.T), axis=-1).reshape(-1, 3)
-        px = hrt.project(spec.camera(name, 64, 64), corners)
-        assert (px[:, :2] >= 0).all()
-        assert (px[:, :2] <= 64).all()
+        t = first_hits(loaded, spec.camera(name, 64, 36))
+        assert np.isfinite(t).mean() > 0.45
 
 
 def test_a_file_without_extent_or_that_cannot_be_read_is_refused(tmp_path):
