@@ -85,3 +85,9 @@ class GBuffer(Record):
         """All images, in the order of the attributes, as kernels take them."""
         arrays: GBufferArrays = self._arrays
         return arrays
+
+    def __repr__(self) -> str:
+        camera = self.camera
+        covered = np.count_nonzero(self.prim_id >= 0) / self.prim_id.size
+        size = f"{camera.width} x {camera.height} pixels"
+        return f"<GBuffer of {self.scene.name!r}: {size}, {100 * covered:.1f} % covered>"
