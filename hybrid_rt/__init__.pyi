@@ -40,6 +40,7 @@ from .rays.hits import Hits as Hits
 from .rays.marched import Marched as Marched
 from .rays.marched import MarchStatus as MarchStatus
 from .rays.marched import MarchWork as MarchWork
+from .rays.primary import primary_rays as primary_rays
 from .rays.rays import Rays as Rays
 from .registry import Registry as Registry
 from .scene.io import load_scene as load_scene

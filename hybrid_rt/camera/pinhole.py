@@ -124,6 +124,11 @@ class Camera:
             near=near,
         )
 
+    def __repr__(self) -> str:
+        eye, forward = (" ".join(f"{x:.4g}" for x in v) for v in (self.eye, self.forward))
+        size = f"{self.width} x {self.height} pixels, {self.vfov_deg:.4g} degrees high"
+        return f"<Camera at ({eye}) along ({forward}): {size}, near {self.near:.4g}>"
+
     def resized(self, width: int, height: int) -> Camera:
         """Return the same view with another number of pixels; the vertical field of view stays."""
         return replace(self, width=width, height=height)

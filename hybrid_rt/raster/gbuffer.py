@@ -8,9 +8,9 @@ import numpy as np
 
 from hybrid_rt import _check
 from hybrid_rt._record import Record
-from hybrid_rt.camera.pinhole import Camera
+from hybrid_rt.camera.pinhole import Camera, unproject
 from hybrid_rt.errors import ArgumentError
-from hybrid_rt.kernels.arrays import F32, I32, GBufferArrays
+from hybrid_rt.kernels.arrays import F32, F64, I32, Bool, GBufferArrays
 from hybrid_rt.scene.mesh import Scene
 
 
@@ -85,3 +85,47 @@ class GBuffer(Record):
         """All images, in the order of the attributes, as kernels take them."""
         arrays: GBufferArrays = self._arrays
         return arrays
+
+    @property
+    def position(self) -> F64:
+        """Visible points: (H, W, 3) float64, world, NaN where nothing is visible.
+
+        Where the view through the pixel's centre has the stored depth, which is float32: off the
+        triangle by its rounding, 6e-8 of the distance along the view. Made anew at each use.
+        """
+        covered = self.prim_id >= 0
+        y, x = np.nonzero(covered)
+        points = unproject(self.camera, np.stack([x + 0.5, y + 0.5, self.depth[covered]], axis=1))
+        return self._image_of(covered, points)
+
+    @property
+    def normal(self) -> F64:
+        """Normals of the visible triangles: (H, W, 3) float64, world, NaN where nothing is visible.
+
+        Of unit length, turned to the side that is seen: the geometric normals
+        ``cross(b - a, c - a)``, or their opposites where the winding faces away from the eye. A
+        triangle seen exactly edge-on keeps the sense of its winding. A triangle of zero area, which
+        `rasterize` never shows, has NaN. Made anew at each use.
+        """
+        covered = self.prim_id >= 0
+        visible, of_pixel = np.unique(self.prim_id[covered], return_inverse=True)
+        a, b, c = self.scene.vertices[self.scene.faces[visible]].astype(np.float64).swapaxes(0, 1)
+        normals = np.cross(b - a, c - a)
+        with np.errstate(invalid="ignore"):
+            normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        away = np.einsum("ij,ij->i", normals, a - np.array(self.camera.eye)) > 0
+        normals[away] *= -1.0
+        return self._image_of(covered, normals[of_pixel])
+
+    @staticmethod
+    def _image_of(covered: Bool, rows: F64) -> F64:
+        """Return the (H, W, 3) image with these rows at the covered pixels and NaN elsewhere."""
+        image = np.full((*covered.shape, 3), np.nan)
+        image[covered] = rows
+        return image
+
+    def __repr__(self) -> str:
+        camera = self.camera
+        covered = np.count_nonzero(self.prim_id >= 0) / self.prim_id.size
+        size = f"{camera.width} x {camera.height} pixels"
+        return f"<GBuffer of {self.scene.name!r}: {size}, {100 * covered:.1f} % covered>"

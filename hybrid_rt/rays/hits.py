@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybrid_rt import _check
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels.arrays import F32, I32, HitArrays
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 LARGEST = 2**31 - 1
 """Rays in one call: kernels number them in int32."""
@@ -75,6 +78,23 @@ class Hits:
         except Exception as error:  # an index of anything, arrays that are read-only
             expected = f"rows of {len(self)} writable hits, as many as there are values"
             raise ArgumentError("index", expected, f"{_check.describe(index)}: {error}") from error
+
+    def to_pandas(self) -> DataFrame:
+        """Return a table of its own with a row for each ray.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns t, prim_id, u, v, n_g_x, n_g_y, n_g_z with the dtypes of the arrays.
+        """
+        from pandas import DataFrame  # half a second, for those who want it
+
+        columns = {"t": self.t, "prim_id": self.prim_id, "u": self.u, "v": self.v}
+        normals = {f"n_g_{axis}": self.n_g[:, k] for k, axis in enumerate("xyz")}
+        return DataFrame({name: array.copy() for name, array in (columns | normals).items()})
+
+    def __repr__(self) -> str:
+        return f"<Hits of {len(self)} rays: {int((self.prim_id >= 0).sum())} hit>"
 
     def _checked(self, argument: str, n: int, faces: int) -> Hits:
         """Return these hits if they can be those of N rays in a scene of so many faces.

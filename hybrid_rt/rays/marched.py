@@ -209,5 +209,10 @@ class Marched:
             raise ArgumentError(f"{argument}.t", "a finite t for every resolved hit", "others")
         return marched
 
+    def __repr__(self) -> str:
+        hits = int((self.resolved & (self.prim_id >= 0)).sum())
+        misses = int(self.resolved.sum()) - hits
+        return f"<Marched: {len(self)} rays, {hits} hits and {misses} misses resolved>"
+
     def __len__(self) -> int:
         return len(self.status)

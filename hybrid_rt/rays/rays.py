@@ -90,6 +90,11 @@ class Rays(Record):
     def __len__(self) -> int:
         return len(self.origin)
 
+    def __repr__(self) -> str:
+        scene = "" if self.scene is None else f" of {self.scene.name!r}"
+        view = "" if self.camera is None else f", {self.camera.width} x {self.camera.height} pixels"
+        return f"<Rays: {len(self)}{scene}{view}>"
+
     @property
     def arrays(self) -> RayArrays:
         """All arrays, in the order of the attributes, as kernels take them."""

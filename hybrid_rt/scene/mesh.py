@@ -183,6 +183,40 @@ class Scene(_Triangles):
         polygon_id = read_only(polygons.astype(np.int32, copy=False))
         return cls._made(arrays, name=name, polygon_id=polygon_id)
 
+    @classmethod
+    def from_trimesh(cls, mesh_or_scene: Any, *, name: str = "scene") -> Scene:
+        """Return a scene of what trimesh holds in memory.
+
+        Parameters
+        ----------
+        mesh_or_scene : trimesh.Trimesh or trimesh.Scene
+            Anything with `vertices` and `faces`, or with `dump()` that returns such meshes where
+            its graph puts them, each of which becomes an object. What has no faces, such as points
+            and paths, is left out.
+        name : str
+
+        Raises
+        ------
+        ArgumentError
+            Something else, no faces at all, or what `Mesh` does not take.
+        """
+        argument = "mesh_or_scene"
+        expected = "a trimesh.Trimesh or a trimesh.Scene"
+        parts = [mesh_or_scene]
+        try:
+            if not hasattr(mesh_or_scene, "faces"):
+                parts = [part for part in mesh_or_scene.dump() if hasattr(part, "faces")]
+            pairs = [(np.asarray(part.vertices), np.asarray(part.faces)) for part in parts]
+        except Exception as error:  # whatever somebody's own class does
+            raise ArgumentError(argument, expected, _check.describe(mesh_or_scene)) from error
+        meshes = [Mesh(vertices, faces) for vertices, faces in pairs if len(faces)]
+        if not meshes:
+            raise ArgumentError(argument, "at least one triangle", "none")
+        return cls.from_meshes(meshes, name=name)
+
+    def __repr__(self) -> str:
+        return f"<Scene {self.name!r}: {len(self)} triangles, {len(self.vertices)} vertices>"
+
     def same_as(self, other: Scene) -> bool:
         """Return whether `other` has the same triangles in the same order."""
         _check.instance("other", other, Scene)

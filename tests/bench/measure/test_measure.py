@@ -4,7 +4,7 @@ import pytest
 import hybrid_rt as hrt
 from hybrid_rt_bench.experiments import load_experiment
 from hybrid_rt_bench.measure import environment as env
-from hybrid_rt_bench.measure import plan, primary, shade, strongest
+from hybrid_rt_bench.measure import plan, shade, strongest
 
 PAPER = load_experiment("paper")
 
@@ -13,32 +13,6 @@ def quad_scene():
     """Return a floor of two triangles at y = 0."""
     corners = np.array([(-4, 0, -4), (4, 0, -4), (4, 0, 4), (-4, 0, 4)], np.float32)
     return hrt.Scene.from_arrays(corners, np.array([(0, 1, 2), (0, 2, 3)], np.int32))
-
-
-@pytest.mark.parametrize(("width", "height"), [(1, 1), (7, 3), (64, 33)])
-def test_primary_rays_go_once_through_the_centre_of_every_pixel(width, height):
-    camera = hrt.Camera.look_at((1, 2, 3), (0, 0.5, -1), width=width, height=height)
-    rays = primary.primary_rays(camera)
-    at = np.array(camera.eye) + 5.0 * rays.direction
-    places = hrt.project(camera, at)
-    assert len(rays) == width * height
-    assert np.allclose(places[:, 0] % 1, 0.5, atol=1e-3)
-    assert np.allclose(places[:, 1] % 1, 0.5, atol=1e-3)
-    pixels = {(int(x), int(y)) for x, y, _ in places}
-    assert pixels == {(x, y) for x in range(width) for y in range(height)}
-
-
-def test_primary_rays_have_z_view_for_t():
-    camera = hrt.Camera.look_at((0, 2, 3), (0, 0, 0), width=32, height=24, near=0.1)
-    rays = primary.primary_rays(camera)
-    hits = hrt.EmbreeTracer(quad_scene()).intersect(rays)
-    gbuffer = hrt.rasterize(quad_scene(), camera)
-    seen = hits.prim_id >= 0
-    assert seen.sum() == (gbuffer.prim_id >= 0).sum()
-    assert np.allclose(
-        np.sort(camera.near / hits.t[seen]), np.sort(gbuffer.depth[gbuffer.depth > 0]), rtol=1e-5
-    )
-    assert (rays.t_near == np.float32(camera.near)).all()
 
 
 class SlowTracer:
@@ -118,7 +92,7 @@ def test_candidates_are_every_path_that_can_differ_in_both_modes():
         assert ("by direction" in candidate.label) is (candidate.tracer.order == "direction")
         assert ("robust" in candidate.label) is candidate.tracer.robust
         assert candidate.label.startswith(candidate.tracer.path)
-    rays = primary.primary_rays(hrt.Camera.look_at((0, 2, 3), (0, 0, 0), width=16, height=16))
+    rays = hrt.primary_rays(hrt.Camera.look_at((0, 2, 3), (0, 0, 0), width=16, height=16))
     answers = [candidate.tracer.intersect(rays).prim_id for candidate in found]
     assert all((answer == answers[0]).all() for answer in answers)
 

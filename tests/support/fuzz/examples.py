@@ -165,6 +165,7 @@ VALUES = {
     "high": lambda: 0.6,
     "path": lambda: "nowhere.npz",
     "meshes": lambda: [INSTANCES["Mesh"]()],
+    "mesh_or_scene": lambda: INSTANCES["Mesh"](),
     "callback": lambda: None,
     "position": lambda: (0, 4, 4),
     "corner": lambda: (0, 4, 4),

@@ -26,7 +26,6 @@ from hybrid_rt_bench.measure import compiling, shade, strongest
 from hybrid_rt_bench.measure.errors import CellError
 from hybrid_rt_bench.measure.experiment import Resolution
 from hybrid_rt_bench.measure.loaded import LoadedScene, prepare
-from hybrid_rt_bench.measure.primary import primary_rays
 from hybrid_rt_bench.measure.screens import Screens
 
 
@@ -76,7 +75,7 @@ def measure_cell(
     rays = hrt.mirror_rays(gbuffer)
     if len(rays) == 0:
         raise CellError(f"{name}: the camera sees no surface, so there are no mirror rays")
-    primary = primary_rays(camera)
+    primary = hrt.primary_rays(camera, order="tiles")
     mirror_choice = strongest.choose(loaded.candidates, rays, experiment.selection_rays)
     primary_choice = strongest.choose(loaded.candidates, primary, experiment.selection_rays)
     stages = _Stages(
@@ -158,7 +157,9 @@ def stages_to_compile(
     return {
         "raster": gbuffer,
         "mirror rays": lambda: hrt.mirror_rays(gbuffer()),
-        "Embree": lambda: strongest.choose(loaded.candidates, primary_rays(camera), 1024),
+        "Embree": lambda: strongest.choose(
+            loaded.candidates, hrt.primary_rays(camera, order="tiles"), 1024
+        ),
         **{technique.name: march(technique) for technique in techniques},
         "judge and picture": lambda: measure_cell(
             loaded, camera, "compilation", tiny, techniques, threads

@@ -24,7 +24,6 @@ from hybrid_rt_bench.kinds.peers.programs.base import Opened, Peer, View
 from hybrid_rt_bench.kinds.peers.programs.ours import Embree
 from hybrid_rt_bench.measure import strongest
 from hybrid_rt_bench.measure.errors import reason_of
-from hybrid_rt_bench.measure.primary import primary_rays
 from hybrid_rt_bench.results import statistics as stats
 from hybrid_rt_bench.results.files import ReportsError
 
@@ -144,7 +143,7 @@ def measure_cell(
 
 def _from_the_eye(camera: hrt.Camera) -> hrt.Rays:
     """Return primary rays without t_near, which no peer can be told of."""
-    rays = primary_rays(camera)
+    rays = hrt.primary_rays(camera, order="tiles")
     return hrt.Rays.from_arrays(rays.origin, rays.direction)
 
 

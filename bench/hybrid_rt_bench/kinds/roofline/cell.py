@@ -25,7 +25,6 @@ from hybrid_rt_bench.kinds.roofline.spec import RooflineExperiment
 from hybrid_rt_bench.measure import strongest
 from hybrid_rt_bench.measure.errors import CellError
 from hybrid_rt_bench.measure.loaded import LoadedScene
-from hybrid_rt_bench.measure.primary import primary_rays
 from hybrid_rt_bench.results import statistics as stats
 from hybrid_rt_bench.results.schema import HYBRID_STAGES
 
@@ -79,7 +78,7 @@ def measure_cell(
         raise CellError(f"{name}: the camera sees no surface, so there are no mirror rays")
     choice = strongest.choose(loaded.candidates, rays, experiment.selection_rays)
     counts = thread_counts(threads)
-    primary = primary_rays(camera)
+    primary = hrt.primary_rays(camera, order="tiles")
     first_hit = strongest.choose(loaded.candidates, primary, experiment.selection_rays).best.tracer
     stages = [
         _Stages(
