@@ -69,7 +69,7 @@ def hiz(
 
 def _confidence(ray, pixel, t, thickness, border):
     view = ray.view
-    # The normal of the pixel's plane in the space of q = M (p - eye, 1), turned to the viewer, where
+    # The normal of the pixel's plane in the space of q = M (p - eye, 1), turned to where
     # q_d - a q_x - b q_y - c q_w is positive.
     a, b = view.ddx[pixel[1]][pixel[0]], view.ddy[pixel[1]][pixel[0]]
     normal = (-a, -b, -view.plane(pixel, 0, 0), 1.0)
