@@ -115,7 +115,7 @@ class HiZ(Technique):
 
     def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
         numbers = HiZNumbers(
-            stepping.length_in(screen.scene, self.thickness),
+            stepping.length_in(screen, self.thickness),
             screen.camera.near,
             float(self.threshold),
             float(self.border),

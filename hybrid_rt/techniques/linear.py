@@ -80,7 +80,7 @@ class Linear(Technique):
         return [*points, Point(f"thickness {usual.thickness}, unrefined", cls(refinements=0))]
 
     def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
-        thickness = stepping.length_in(screen.scene, self.thickness) / screen.camera.near
+        thickness = stepping.length_in(screen, self.thickness) / screen.camera.near
         numbers = LinearNumbers(
             thickness, float(self.stride), int(self.refinements), int(self.max_steps)
         )
