@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid_rt import _check
-from hybrid_rt.camera.pinhole import Camera
+from hybrid_rt.camera.camera import Camera
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels.arrays import F64, Bool
 
@@ -77,8 +77,15 @@ def form(camera: Camera, depth: Any, kind: Any, bits: Any, far: Any, origin: Any
     """Return how to read a depth buffer, its shape and dtype being right."""
     kind = _check.choice("kind", kind, KINDS)
     bottom = _check.choice("origin", origin, ORIGINS) == "bottom"
-    infinite = far is None or (isinstance(far, float) and far == np.inf)
-    distance = np.inf if infinite else _check.real("far", far, above=camera.near)
+    if camera.parallel and kind == "distance":
+        expected = "another kind for an orthographic camera, whose lines of sight begin nowhere"
+        raise ArgumentError("kind", expected, repr(kind))
+    if camera.parallel and far not in (None, camera.far):
+        expected = f"None, or that of the camera, {camera.far:g}"
+        raise ArgumentError("far", expected, _check.describe(far))
+    distance = camera.far if far is None else np.inf
+    if far is not None and not (isinstance(far, float) and far == np.inf):
+        distance = _check.real("far", far, above=camera.near)
     if not isinstance(depth, np.ndarray):
         raise ArgumentError("depth", "a NumPy array", _check.describe(depth))
     shape = camera.height, camera.width
@@ -125,7 +132,7 @@ def read(camera: Camera, depth: NDArray[Any], how: Form, background: Any = None)
     inner = np.where(empty, how.nothing, values)
     screen, off = _on_screen(camera, inner, half, how)
     screen[empty], off[empty] = 0.0, 0.0
-    if how.kind in OTHER:
+    if how.kind in OTHER and not camera.parallel:
         _not_the_other(screen[~empty], how)
     if how.bottom:
         screen, off = screen[::-1], off[::-1]
@@ -135,24 +142,30 @@ def read(camera: Camera, depth: NDArray[Any], how: Form, background: Any = None)
 def _on_screen(camera: Camera, values: F64, half: F64, how: Form) -> tuple[F64, F64]:
     """Return depth and its uncertainty.
 
-    With z the distance along the view, n and f the planes, the screen has n / z and standard
-    buffers have ``f / (f - n) * (1 - n / z)``: one is linear in the other.
+    With z the distance along the view, n and f the planes, the screen of a pinhole camera has n / z
+    and standard buffers have ``f / (f - n) * (1 - n / z)``; of an orthographic camera, it has
+    ``(f - z) / (f - n)`` and they ``(z - n) / (f - n)``. So one is linear in the other.
     """
-    per_value = 1.0 - camera.near / how.far
+    per_value = 1.0 if camera.parallel else 1.0 - camera.near / how.far
     if how.kind == "standard":
         return 1.0 - values * per_value, half * per_value
     if how.kind == "reversed":
-        return camera.near / how.far + values * per_value, half * per_value
-    along: Any = 1.0 if how.kind == "linear" else _view_lengths(camera, how.bottom)
+        return 1.0 - (1.0 - values) * per_value, half * per_value
+    if how.kind == "distance":
+        along = _view_lengths(camera, how.bottom)
+        values, half = values / along, half / along
+    screen = np.minimum(camera.depth_at(values), 1.0)
+    if camera.parallel:
+        return np.maximum(screen, 0.0), half / (camera.far - camera.near)
     with np.errstate(divide="ignore", invalid="ignore"):
-        screen = np.minimum(camera.near * along / values, 1.0)
         return screen, screen * (half / values)
 
 
 def _view_lengths(camera: Camera, bottom: bool) -> F64:
     """Return, for the rows of a buffer, how far it is to where z is 1: (H, W)."""
-    x = (np.arange(camera.width) + 0.5 - 0.5 * camera.width) / camera.focal_px
-    y = (np.arange(camera.height) + 0.5 - 0.5 * camera.height) / camera.focal_px
+    (fx, fy), (cx, cy) = camera.scale_px, camera.centre_px
+    x = (np.arange(camera.width) + 0.5 - cx) / fx
+    y = (np.arange(camera.height) + 0.5 - cy) / fy
     lengths = np.sqrt(1.0 + x[None, :] ** 2 + y[:, None] ** 2)
     return lengths[::-1] if bottom else lengths
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybrid_rt import _check
 from hybrid_rt._record import Record, read_only
-from hybrid_rt.camera.pinhole import Camera, unproject
+from hybrid_rt.camera.camera import Camera, unproject
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels.arrays import F32, F64, I32, Bool, GBufferArrays
 from hybrid_rt.raster import derivatives, engine_depth, tilted
@@ -27,7 +27,8 @@ class GBuffer(Record):
     Attributes
     ----------
     depth : (H, W) float32
-        ``near / z_view`` at the pixel's centre, 0 where nothing is visible.
+        At the pixel's centre, 0 where nothing is visible: ``near / z_view`` of a pinhole camera,
+        ``(far - z_view) / (far - near)`` of an orthographic one.
     ddx, ddy : (H, W) float32
         Change of `depth` for one pixel to the right and one pixel down.
     prim_id : (H, W) int32
@@ -142,7 +143,8 @@ class GBuffer(Record):
             How many bits of an integer hold the depth, in the low end: 24 of uint32 for a D24
             buffer. Default: 16 for uint16; of uint32 it must be said.
         far : float, optional
-            Distance of the far plane along the view, world units, > near. Default: infinite.
+            Distance of the far plane along the view, world units, > near. Default: that of the
+            camera, which is infinite unless it says another.
         origin : {"top", "bottom"}
             Which row of the picture is row 0. ``glReadPixels`` and textures of OpenGL begin at the
             "bottom".
@@ -188,7 +190,8 @@ class GBuffer(Record):
                       along the pixel's ray
         ============  ===============================  =================  ========================
 
-        OpenGL's z from -1 to 1 is that of clip space; what it stores is 0 to 1.
+        OpenGL's z from -1 to 1 is that of clip space; what it stores is 0 to 1. Of an orthographic
+        camera "standard" holds (z - n) / (f - n), and "distance" is refused.
 
         **Without a mesh** `depth` is that of the buffer, `uncertainty` says how coarse it is, and
         `ddx` and `ddy` come from neighbours (`hybrid_rt.raster.derivatives.differences`).
@@ -319,7 +322,7 @@ class GBuffer(Record):
         normals = np.cross(b - a, c - a)
         with np.errstate(invalid="ignore"):
             normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        away = np.einsum("ij,ij->i", normals, a - np.array(self.camera.eye)) > 0
+        away = np.einsum("ij,ij->i", normals, self.camera.towards(a)) > 0
         normals[away] *= -1.0
         return np.asarray(normals)
 

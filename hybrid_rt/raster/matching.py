@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybrid_rt import _check
-from hybrid_rt.camera.pinhole import Camera
+from hybrid_rt.camera.camera import Camera
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels.arrays import F64, I32, Bool
 from hybrid_rt.raster.engine_depth import ScreenDepth
@@ -127,16 +127,15 @@ class _Found:
             return
         depth, off = self.seen.depth[y, x], self.seen.uncertainty[y, x]
         around = 4.0 * off + 64.0 * ULPS * depth
-        near, camera = self.camera.near, self.camera
-        frame = camera.world_from_pixel
-        places = np.stack([x + 0.5 - 0.5 * camera.width, y + 0.5 - 0.5 * camera.height], axis=1)
-        direction = np.array(camera.forward) + places @ frame[:2]
-        origin = np.broadcast_to(np.array(camera.eye), direction.shape)
-        farthest = near / np.maximum(depth - around, near / np.finfo(np.float32).max)
+        camera = self.camera
+        origin, direction, nearest, farthest = camera.primary(x + 0.5, y + 0.5)
+        start = camera.near if camera.parallel else 0.0  # where t is 0, along the view
+        first = camera.z_view(depth + around) - start
+        last = camera.z_view(np.maximum(depth - around, 0.0)) - start
         hits = tracer.intersect(
             Rays.from_arrays(
                 origin.astype(np.float32), direction.astype(np.float32), None,
-                near / (depth + around), farthest,
+                np.maximum(first, nearest), np.minimum(last, farthest),
             )
         )  # fmt: skip
         candidates = np.full(self.covered.shape, -1, np.int32)
@@ -147,14 +146,30 @@ class _Found:
 def plane_at(scene: Scene, camera: Camera, prim_id: I32, x: Any, y: Any) -> tuple[F64, F64, F64]:
     """Return depth, ddx and ddy of triangles' planes at pixels' centres; NaN where seen edge-on."""
     a, b, c = scene.vertices[scene.faces[prim_id]].astype(np.float64).swapaxes(0, 1)
-    normal = np.cross(b - a, c - a)
-    right, down, forward = camera.world_from_pixel
+    m = camera.arrays.m
+    # Of a corner and two edges: x w, y w, w and d, of which d = depth w; x and y from the pixel on.
+    rows = np.stack(
+        [
+            (a - np.array(camera.eye)) @ m[:, :3].T + m[:, 3],
+            (b - a) @ m[:, :3].T,
+            (c - a) @ m[:, :3].T,
+        ]
+    )
+    w, d = rows[..., 2].T, rows[..., 3].T
+    right = rows[..., 0].T - np.asarray(x + 0.5)[:, None] * w
+    down = rows[..., 1].T - np.asarray(y + 0.5)[:, None] * w
     with np.errstate(divide="ignore", invalid="ignore"):
-        scale = camera.near / np.einsum("ij,ij->i", normal, a - np.array(camera.eye))
-        ddx, ddy, ahead = (scale * (normal @ axis) for axis in (right, down, forward))
-        across = x + 0.5 - 0.5 * camera.width
-        depth = ahead + across * ddx + (y + 0.5 - 0.5 * camera.height) * ddy
-    return depth, ddx, ddy
+        whole = _triple(right, down, w)
+        return (
+            _triple(right, down, d) / whole,
+            _triple(d, down, w) / whole,
+            _triple(right, d, w) / whole,
+        )
+
+
+def _triple(a: F64, b: F64, c: F64) -> F64:
+    """Return the determinants of rows (N, 3)."""
+    return np.asarray(np.einsum("ij,ij->i", a, np.cross(b, c)))
 
 
 def checked_tracer(tracer: Any, scene: Scene | None) -> Scene | None:
@@ -182,9 +197,9 @@ def _of_another(seen: ScreenDepth, ours: GBuffer, share: float) -> ArgumentError
     got = f"one that agrees with it in {100 * share:.1f} % of its covered pixels"
     if len(where):
         y, x = (int(k) for k in where[len(where) // 2])
-        near = ours.camera.near
-        mesh = f"{near / ours.depth[y, x]:.6g}" if ours.depth[y, x] > 0 else "nothing"
-        got += f" (at pixel ({x}, {y}): {near / seen.depth[y, x]:.6g} along the view, mesh {mesh})"
+        there, here = (float(ours.camera.z_view(d[y, x])) for d in (seen.depth, ours.depth))
+        mesh = f"{here:.6g}" if ours.depth[y, x] > 0 else "nothing"
+        got += f" (at pixel ({x}, {y}): {there:.6g} along the view, mesh {mesh})"
     if agreeing(seen.depth[::-1]) > max(LEAST_MATCHED, agreeing(seen.depth)):
         got += '; upside down it would agree: see origin="bottom"'
     else:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid_rt.camera.pinhole import Camera, unproject
+from hybrid_rt.camera.camera import Camera, unproject
 from hybrid_rt.kernels.arrays import F32, F64, I32, Bool, GBufferArrays
 
 WIDEST = 8.0

@@ -1,5 +1,6 @@
 """Depth buffers of every kind and format, written as engines do, read back against the raster."""
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -11,6 +12,20 @@ KINDS = ("standard", "reversed", "linear", "distance")
 FORMATS = (np.float16, np.float32, np.float64, 16, 24, 32)
 
 
+CAMERAS = {
+    "pinhole": hrt.Camera.look_at(
+        (0, 0, 5), (0, 0.3, 0), vfov_deg=50, width=96, height=64, near=0.1
+    ),
+    "off centre, fx unlike fy": hrt.Camera.from_intrinsics(
+        [[70, 0, 40], [0, 60, 36], [0, 0, 1]], np.diag([1, -1, -1]), (0, 0.3, 5),
+        width=96, height=64, near=0.1,
+    ),
+    "orthographic": hrt.Camera.orthographic(
+        (0, 0, 5), (0, 0.3, 0), view_height=3.5, near=-1, far=9, width=96, height=64
+    ),
+}  # fmt: skip
+
+
 def triangles(seed, n):
     """Return triangles of middling size around the origin."""
     rng = np.random.default_rng(seed)
@@ -18,12 +33,10 @@ def triangles(seed, n):
     return hrt.Scene.from_arrays(corners.reshape(-1, 3), np.arange(3 * n).reshape(n, 3))
 
 
-def view(seed=3, width=96, height=64):
+def view(name="pinhole"):
     """Return a scene of random triangles with holes between them, and what a camera sees of it."""
-    scene = triangles(seed, 80)
-    camera = hrt.Camera.look_at(
-        (0, 0, 5), (0, 0.3, 0), vfov_deg=50, width=width, height=height, near=0.1
-    )
+    scene = triangles(3, 80)
+    camera = CAMERAS[name]
     gbuffer = hrt.rasterize(scene, camera)
     assert 0.3 < (gbuffer.prim_id >= 0).mean() < 1.0
     return scene, camera, gbuffer
@@ -88,6 +101,61 @@ def test_depth_comes_back_within_the_step_that_is_said(kind, form, far, origin):
     assert (off <= said * (1 + 1e-6) + 2.0**-23 * drawn.depth[~empty] + 1e-15).all()
     if form in (np.float16, 16, 24):  # it says no more than it must
         assert (off > 0.5 * said).mean() > 0.2
+
+
+@pytest.mark.parametrize("form", [np.float32, 24, 16])
+@pytest.mark.parametrize("kind", ["standard", "reversed", "linear"])
+def test_an_orthographic_buffer_is_linear_between_its_planes(kind, form):
+    scene, camera, drawn = view("orthographic")
+    n, f = camera.near, camera.far
+    z = np.where(drawn.depth > 0, f - drawn.depth.astype(float) * (f - n), f)
+    share = (z - n) / (f - n)
+    values = {"standard": share, "reversed": 1 - share, "linear": z}[kind]
+    bits = None
+    if kind != "linear" and isinstance(form, int):
+        values, bits = np.round(values * (2**form - 1)).astype(np.uint32), form
+    else:
+        values = values.astype(np.float32)
+    alone = hrt.GBuffer.from_arrays(camera, values, kind=kind, bits=bits)
+    off = np.abs(alone.depth - drawn.depth)
+    assert (off <= alone.uncertainty * 1.001 + 2.0**-23).all()
+    found = hrt.GBuffer.from_arrays(camera, values, kind=kind, bits=bits, scene=scene)
+    assert (found.prim_id == drawn.prim_id).mean() > 0.99
+    assert found.matched.all()
+    rays, theirs = hrt.mirror_rays(alone), hrt.mirror_rays(drawn)
+    assert np.median((rays.direction * theirs.direction).sum(axis=1)) > 0.999
+
+
+def test_an_orthographic_view_has_its_own_far_plane_and_no_distance_from_an_eye():
+    _, camera, drawn = view("orthographic")
+    with pytest.raises(hrt.ArgumentError, match="far: expected None, or that of the camera, 9"):
+        hrt.GBuffer.from_arrays(camera, drawn.depth, kind="reversed", far=8.0)
+    with pytest.raises(hrt.ArgumentError, match="kind: expected another kind"):
+        hrt.GBuffer.from_arrays(camera, drawn.depth, kind="distance")
+    found = hrt.GBuffer.from_arrays(camera, drawn.depth, kind="reversed", far=9.0)
+    np.testing.assert_array_equal(found.depth, drawn.depth)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_off_the_middle_and_of_odd_pixels(kind):
+    scene, camera, drawn = view("off centre, fx unlike fy")
+    dump = written(drawn, kind, np.float32)
+    found = hrt.GBuffer.from_arrays(camera, dump, kind=kind, scene=scene)
+    np.testing.assert_array_equal(found.prim_id, drawn.prim_id)
+    assert found.matched.all()
+    alone = hrt.GBuffer.from_arrays(camera, dump, kind=kind)
+    np.testing.assert_allclose(alone.depth, drawn.depth, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(
+        np.nanmedian((alone.normal * drawn.normal).sum(axis=2)), 1.0, atol=1e-4
+    )
+
+
+def test_the_far_plane_of_the_camera_counts_where_none_is_said():
+    _, camera, drawn = view()
+    dump = written(drawn, "standard", np.float32, 60.0)
+    said = hrt.GBuffer.from_arrays(camera, dump, far=60.0)
+    known = hrt.GBuffer.from_arrays(dataclasses.replace(camera, far=60.0), dump)
+    np.testing.assert_array_equal(known.depth, said.depth)
 
 
 @pytest.mark.parametrize(("kind", "form"), [(k, f) for k, f, _, o in CASES[::4]])
