@@ -67,7 +67,7 @@ class PixelDDA(stepping.Stepping):
     def _numbers(self, screen: Screen) -> PixelDDANumbers:
         camera = screen.camera
         return PixelDDANumbers(
-            *camera.receding(stepping.length_in(screen.scene, self.thickness)),
+            *camera.receding(stepping.length_in(screen, self.thickness)),
             int(self.stride),
             float(self.jitter),
             int(self.max_steps or camera.width + camera.height + 2),

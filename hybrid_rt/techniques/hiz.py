@@ -114,7 +114,7 @@ class HiZ(stepping.Stepping):
     def _numbers(self, screen: Screen) -> HiZNumbers:
         camera = screen.camera
         return HiZNumbers(
-            stepping.length_in(screen.scene, self.thickness),
+            stepping.length_in(screen, self.thickness),
             camera.far - camera.near if camera.parallel else camera.near,
             camera.parallel,
             float(self.threshold),

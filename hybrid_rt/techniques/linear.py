@@ -81,7 +81,7 @@ class Linear(stepping.Stepping):
     def _numbers(self, screen: Screen) -> LinearNumbers:
         camera = screen.camera
         return LinearNumbers(
-            *camera.receding(stepping.length_in(screen.scene, self.thickness)),
+            *camera.receding(stepping.length_in(screen, self.thickness)),
             float(self.stride) * camera.stride_unit,
             int(self.refinements),
             int(self.max_steps),

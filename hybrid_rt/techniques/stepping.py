@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +18,6 @@ from hybrid_rt.kernels.techniques.placing import LANES
 from hybrid_rt.raster.pyramid import Pyramid, bits
 from hybrid_rt.rays.marched import Marched
 from hybrid_rt.rays.rays import Rays
-from hybrid_rt.scene.mesh import Scene
 
 MOST = 2**31 - 1
 
@@ -25,6 +25,8 @@ MOST = 2**31 - 1
 @dataclass(frozen=True)
 class Share:
     """A length as a share of the diagonal of the scene's bounding box.
+
+    Of a scene that is not known it is that of the visible points.
 
     World units mean nothing to a technique that does not know the scene; a share does.
 
@@ -54,9 +56,12 @@ def checked_thickness(value: Any) -> None:
         _check.real("thickness", value, above=0.0)
 
 
-def length_in(scene: Scene, length: float | Share) -> float:
-    """Return a length in a scene, world units."""
-    return length.value * scene.diagonal if isinstance(length, Share) else float(length)
+def length_in(screen: Screen, length: float | Share) -> float:
+    """Return a length in what is on a screen, world units; see `Share`."""
+    if not isinstance(length, Share):
+        return float(length)
+    low, high = screen.gbuffer.bounds
+    return length.value * math.dist(low, high)
 
 
 def checked_steps(max_steps: int | None) -> None:

@@ -1,6 +1,7 @@
 """Scenes by name: real ones from files, and places generated from code."""
 
 from hybrid_rt_scenes.automatic import automatic_cameras
+from hybrid_rt_scenes.given import GivenCamera, given_cameras
 from hybrid_rt_scenes.registry import (
     SCENES,
     get_scene,
@@ -22,6 +23,7 @@ from hybrid_rt_scenes.spec import (
 __all__ = [
     "SCENES",
     "CameraSpec",
+    "GivenCamera",
     "LightsSpec",
     "MeshSpec",
     "MissingDataError",
@@ -30,6 +32,7 @@ __all__ = [
     "automatic_lights",
     "data_directory",
     "get_scene",
+    "given_cameras",
     "read_definition",
     "register",
     "scene_from_path",
