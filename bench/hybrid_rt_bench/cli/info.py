@@ -6,11 +6,12 @@ from hybrid_rt_bench.cli import terminal
 
 
 def info() -> None:
-    """Show versions, CPU, what Embree chose, and problems that would spoil measurements."""
+    """Show versions, CPU, Embree's choice, where scenes are kept, what would spoil measurements."""
     import numba
     from rich.table import Table
 
     from hybrid_rt_bench.measure import environment as env
+    from hybrid_rt_scenes import data_directories
 
     out = terminal.out()
     load = env.load_average()
@@ -22,6 +23,7 @@ def info() -> None:
         elif key == "memory_bytes":
             key, value = "memory", f"{value / 2**30:.1f} GiB"
         table.add_row(key.replace("_", " "), str(value))
+    table.add_row("scenes looked for in", "\n".join(map(str, data_directories())))
     out.print(table)
     problems = env.problems(found)
     if not problems:
