@@ -162,7 +162,7 @@ def _geometric_mean(values: pd.Series) -> float:
 
 def _views(rows: pd.DataFrame) -> str:
     views = rows[["scene", "camera"]].drop_duplicates()
-    return f"{len(views)} views of {_words(views.scene.unique())}"
+    return f"{len(views)} view{'s' * (len(views) != 1)} of {_words(views.scene.unique())}"
 
 
 def _words(names: Iterable[Any]) -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-import tomli_w
+import tomlkit
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
@@ -59,7 +59,7 @@ class ImportedScene:
             return None
         said = self.spec.model_dump(mode="json", exclude={"name"}, exclude_none=True)
         said["mesh"] = [{"file": self.file}]
-        return tomli_w.dumps(said)
+        return tomlkit.dumps(said)
 
     def covered(self) -> dict[str, float]:
         """Return the share of pixels that show a surface, by camera."""
@@ -115,10 +115,10 @@ def import_scene(
     spec = SceneSpec(
         name=chosen,
         title=path.name,
-        description=f"{len(scene)} triangles, imported from {path.name}.",
+        description=f"{len(scene):,} triangles, imported from {path.name}.",
         needs=f"It was imported from {path.name}.",
         mesh=(MeshSpec(file=file),),
-        cameras=views or automatic_cameras(scene),
+        cameras=views or {k: _rounded(v) for k, v in automatic_cameras(scene).items()},
     )
     return ImportedScene(spec, file, mesh, False, source)
 
@@ -190,6 +190,15 @@ def _view(camera: FileCamera, scale: float, up: Up) -> CameraSpec:
         vfov_deg=math.degrees(camera.yfov),
         near=camera.znear * scale,
     )
+
+
+def _rounded(view: CameraSpec) -> CameraSpec:
+    """Return a view in numbers that people like to edit."""
+    eye, target = (
+        _vector(np.array([float(f"{x:.6g}") for x in place])) for place in (view.eye, view.target)
+    )
+    near = float(f"{view.near:.3g}")
+    return CameraSpec(eye=eye, target=target, vfov_deg=view.vfov_deg, near=near)
 
 
 def _vector(row: F64) -> Vector:

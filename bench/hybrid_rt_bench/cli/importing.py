@@ -94,7 +94,8 @@ def _geometry(made: ImportedScene) -> list[str]:
     scene = Scene.from_meshes([made.mesh])
     objects = len(np.unique(scene.object_id))
     low, high = (", ".join(f"{x:.6g}" for x in corner) for corner in scene.bounds)
-    about = f"scene {made.spec.name!r}: {len(scene):,} triangles, {objects:,} objects"
+    about = f"scene {made.spec.name!r}: {len(scene):,} triangles in {objects:,} object"
+    about += "s" * (objects != 1)
     if scene.zero_area:
         about += f", {scene.zero_area:,} triangles of zero area, which no ray hits"
     return [about, f"from ({low}) to ({high}), diagonal {scene.diagonal:.6g}, +Y up"]
