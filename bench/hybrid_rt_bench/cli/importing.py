@@ -97,7 +97,7 @@ def _geometry(made: ImportedScene) -> list[str]:
     about = f"scene {made.spec.name!r}: {len(scene):,} triangles in {objects:,} object"
     about += "s" * (objects != 1)
     if scene.zero_area:
-        about += f", {scene.zero_area:,} triangles of zero area, which no ray hits"
+        about += f", {scene.zero_area:,} of them of zero area, which no ray hits"
     return [about, f"from ({low}) to ({high}), diagonal {scene.diagonal:.6g}, +Y up"]
 
 
