@@ -139,8 +139,8 @@ class Screen:
 
     @property
     def scene(self) -> Scene:
-        """What is on the screen."""
-        return self.gbuffer.scene
+        """What is on the screen; refused by name where that is not known."""
+        return self.gbuffer.known_scene
 
     @property
     def camera(self) -> Camera:
@@ -170,10 +170,9 @@ class Screen:
 
     def __repr__(self) -> str:
         camera = self.camera
-        return (
-            f"<screen of {self.scene.name!r}, {camera.width} x {camera.height}, "
-            f"for {self.technique!r}>"
-        )
+        scene = self.gbuffer.scene
+        of = "a depth buffer alone" if scene is None else repr(scene.name)
+        return f"<screen of {of}, {camera.width} x {camera.height}, for {self.technique!r}>"
 
 
 @dataclass(frozen=True)
@@ -250,13 +249,14 @@ class Technique(abc.ABC):
         any_hit = _check.boolean("any_hit", any_hit)
         _threads.count(threads)
         screen = screen.of(self)
-        check_rays(rays, screen.scene, screen.camera)
+        scene = screen.gbuffer.scene
+        check_rays(rays, scene, screen.camera)
         marched = self._march(rays, screen, any_hit, threads)
         if type(self).__module__.partition(".")[0] == __package__:
             return marched
         _check.instance(f"what {self.name!r} returns", marched, Marched)
         camera = screen.camera
-        size = len(rays), len(screen.scene), camera.width, camera.height
+        size = len(rays), 1 if scene is None else len(scene), camera.width, camera.height
         return marched._checked(f"what {self.name!r} returns", *size)
 
     def _read(self, gbuffer: GBuffer, threads: int | None) -> Any:
@@ -360,9 +360,12 @@ def march(
     return screen.technique.march(rays, screen, any_hit=any_hit, threads=threads)
 
 
-def check_rays(rays: Rays, scene: Scene, camera: Camera | None = None) -> None:
-    """Raise unless rays may be used with a scene, and with a view if one is given."""
-    if rays.scene is not None and not rays.scene.same_as(scene):
+def check_rays(rays: Rays, scene: Scene | None, camera: Camera | None = None) -> None:
+    """Raise unless rays may be used with a scene, and with a view if one is given.
+
+    Rays of any scene may be marched through a view of one that is not known.
+    """
+    if scene is not None and rays.scene is not None and not rays.scene.same_as(scene):
         raise ArgumentError(
             "rays",
             f"rays of scene {scene.name!r}, or of none (rays.detached())",

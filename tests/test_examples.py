@@ -51,6 +51,15 @@ def test_own_mesh(tmp_path):
 
 
 @pytest.mark.slow
+def test_own_depth_buffer(tmp_path):
+    said = run("own_depth_buffer", tmp_path)
+    shares = dict(re.findall(r"^(\w+) +answers ([\d.]+)%", said, flags=re.MULTILINE))
+    assert sorted(shares) == ["linear", "paper", "slope"]
+    assert all(25 < float(share) < 50 for share in shares.values())
+    assert_picture(tmp_path / "own_depth_buffer.png", colours=300)
+
+
+@pytest.mark.slow
 def test_own_technique(tmp_path):
     rows = {
         line.split()[0]: [float(word.rstrip("%")) for word in line.split()[1:]]

@@ -159,7 +159,7 @@ class Certified(Technique):
 
     def _read(self, gbuffer: GBuffer, threads: int | None) -> CertifiedData:
         camera = self.lists_camera(gbuffer.camera)
-        lists = primitive_lists(gbuffer.scene, camera, int(self.lists), threads)
+        lists = primitive_lists(gbuffer.known_scene, camera, int(self.lists), threads)
         if not self.planes:
             # Every comparison denies NaN, so that no plane ever puts a primitive out of question.
             lists.planes.fill(np.nan)

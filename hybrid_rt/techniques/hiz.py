@@ -116,7 +116,7 @@ class HiZ(Technique):
     def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
         camera = screen.camera
         numbers = HiZNumbers(
-            stepping.length_in(screen.scene, self.thickness),
+            stepping.length_in(screen, self.thickness),
             camera.far - camera.near if camera.parallel else camera.near,
             camera.parallel,
             float(self.threshold),

@@ -83,7 +83,7 @@ class Linear(Technique):
     def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
         camera = screen.camera
         numbers = LinearNumbers(
-            *camera.receding(stepping.length_in(screen.scene, self.thickness)),
+            *camera.receding(stepping.length_in(screen, self.thickness)),
             float(self.stride) * camera.stride_unit,
             int(self.refinements),
             int(self.max_steps),

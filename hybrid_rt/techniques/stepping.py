@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +15,6 @@ from hybrid_rt.kernels.techniques import driver
 from hybrid_rt.raster.pyramid import Pyramid
 from hybrid_rt.rays.marched import Marched
 from hybrid_rt.rays.rays import Rays
-from hybrid_rt.scene.mesh import Scene
 
 MOST = 2**31 - 1
 
@@ -22,6 +22,8 @@ MOST = 2**31 - 1
 @dataclass(frozen=True)
 class Share:
     """A length as a share of the diagonal of the scene's bounding box.
+
+    Of a scene that is not known it is that of the visible points.
 
     World units mean nothing to a technique that does not know the scene; a share does.
 
@@ -51,9 +53,12 @@ def checked_thickness(value: Any) -> None:
         _check.real("thickness", value, above=0.0)
 
 
-def length_in(scene: Scene, length: float | Share) -> float:
-    """Return a length in a scene, world units."""
-    return length.value * scene.diagonal if isinstance(length, Share) else float(length)
+def length_in(screen: Screen, length: float | Share) -> float:
+    """Return a length in what is on a screen, world units; see `Share`."""
+    if not isinstance(length, Share):
+        return float(length)
+    low, high = screen.gbuffer.bounds
+    return length.value * math.dist(low, high)
 
 
 def checked_steps(max_steps: int | None) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -98,6 +99,11 @@ def import_scene(
         that is not finite and > 0, or that leaves float32; an `up` that is neither.
     MeshFileError
         The file cannot be read.
+
+    Warns
+    -----
+    UserWarning
+        Points or lines of the file, or its orthographic cameras, are left out.
     """
     scale = _check.real("scale", scale, above=0.0)
     _check.choice("up", up, ("y", "z"))
@@ -167,8 +173,12 @@ def _cameras(path: Path, scale: float, up: Up) -> dict[str, CameraSpec]:
         return {}
     views: dict[str, CameraSpec] = {}
     for camera in read_cameras(path):
+        if camera.yfov is None:
+            text = f"{path}: camera {camera.name!r} is left out: a scene's views are perspective"
+            warnings.warn(text, UserWarning, stacklevel=3)
+            continue
         try:
-            views[_free(camera.name, views)] = _view(camera, scale, up)
+            views[_free(camera.name, views)] = _view(camera, camera.yfov, scale, up)
         except ValidationError as error:
             said = error.errors()[0]["msg"]
             raise hrt.MeshFileError(f"{path}: camera {camera.name!r}: {said}") from error
@@ -181,13 +191,13 @@ def _free(name: str, taken: Iterable[str]) -> str:
     return next(one for one in itertools.chain([plain], numbered) if one not in taken)
 
 
-def _view(camera: FileCamera, scale: float, up: Up) -> CameraSpec:
+def _view(camera: FileCamera, yfov: float, scale: float, up: Up) -> CameraSpec:
     eye, target, above = _upright(np.array([camera.eye, camera.target, camera.up]), up)
     return CameraSpec(
         eye=_vector(eye * scale),
         target=_vector(target * scale),
         up=_vector(above),
-        vfov_deg=math.degrees(camera.yfov),
+        vfov_deg=math.degrees(yfov),
         near=camera.znear * scale,
     )
 

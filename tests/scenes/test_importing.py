@@ -61,6 +61,16 @@ def test_cameras_of_a_gltf_go_with_the_mesh(tmp_path):
     assert min(made.covered().values()) > 0.09  # they still see what they saw
 
 
+def test_orthographic_cameras_are_left_out_with_a_word(tmp_path):
+    g = Gltf()
+    g.node(mesh=g.mesh())
+    plan = {"xmag": 1, "ymag": 1, "znear": 0.1, "zfar": 9}
+    g.node(camera=g.add("cameras", type="orthographic", orthographic=plan), name="plan")
+    with pytest.warns(UserWarning, match="'plan' is left out"):
+        made = import_scene(g.write(tmp_path / "m.glb"))
+    assert made.cameras_from == "automatic"
+
+
 def test_the_definition_reads_back_the_same(ball, tmp_path):
     made = import_scene(ball, name="ball-2")
     path = tmp_path / "ball-2.toml"

@@ -55,21 +55,21 @@ def _diffuse(spec: SceneSpec, gbuffer: hrt.GBuffer, seed: int) -> hrt.Rays:
 
 
 def _ambient_occlusion(spec: SceneSpec, gbuffer: hrt.GBuffer, seed: int) -> hrt.Rays:
-    low, high = gbuffer.scene.bounds
+    low, high = gbuffer.bounds
     radius = OCCLUSION_REACH * float(np.linalg.norm(high - low))
     return hrt.ambient_occlusion_rays(gbuffer, radius, seed)
 
 
 def _shadow_point(spec: SceneSpec, gbuffer: hrt.GBuffer, seed: int) -> hrt.Rays:
-    return hrt.shadow_rays(gbuffer, spec.lights_of(gbuffer.scene).point_light, seed)
+    return hrt.shadow_rays(gbuffer, spec.lights_of(gbuffer.known_scene).point_light, seed)
 
 
 def _shadow_area(spec: SceneSpec, gbuffer: hrt.GBuffer, seed: int) -> hrt.Rays:
-    return hrt.shadow_rays(gbuffer, spec.lights_of(gbuffer.scene).area_light, seed)
+    return hrt.shadow_rays(gbuffer, spec.lights_of(gbuffer.known_scene).area_light, seed)
 
 
 def _shadow_sun(spec: SceneSpec, gbuffer: hrt.GBuffer, seed: int) -> hrt.Rays:
-    return hrt.shadow_rays(gbuffer, spec.lights_of(gbuffer.scene).directional_light, seed)
+    return hrt.shadow_rays(gbuffer, spec.lights_of(gbuffer.known_scene).directional_light, seed)
 
 
 WORKLOADS = {
