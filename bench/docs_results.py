@@ -80,7 +80,7 @@ def index(runs: dict[str, RunData]) -> str:
         "else; `python bench/reference_runs.py NAME` makes one. They need the scenes sponza, "
         "bistro and nori_sphere ([scenes](../scenes.md)). Then `make results`.",
         "",
-        "[certified.md](../certified.md) and [performance.md](../performance.md) tell of earlier and "
+        "[certified.md](../certified.md) and [performance.md](../performance.md) tell of earlier, "
         "larger runs, each named there by its commit and its command; their files are not kept.",
         "",
         "[corpus.md](corpus.md) compares the readers of mesh files with others, by `make corpus`.",

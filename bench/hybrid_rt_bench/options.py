@@ -32,8 +32,8 @@ class Option:
         return self.name.replace("-", "_")
 
 
-SCENES = Option("scenes", "Scenes by name, or paths of mesh files: sponza,my/hall.glb")
-CAMERAS = Option("cameras", "Cameras by name; every scene takes those that it has.")
+SCENES = Option("scenes", "Scenes by name, or paths of meshes or definitions: sponza,my/hall.glb")
+CAMERAS = Option("cameras", "Cameras by name, where a scene has them; or files, as in `render`.")
 RESOLUTIONS = Option("resolutions", "Picture sizes: 1280x720,1920x1080", changes=True)
 ROUNDS = Option("rounds", "Measured rounds of each cell.", changes=True, number=True)
 TECHNIQUES = Option("techniques", "Techniques by name (see `list`): paper,slope", changes=True)

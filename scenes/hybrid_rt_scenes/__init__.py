@@ -1,6 +1,7 @@
 """Scenes by name: real ones from files, and places generated from code."""
 
 from hybrid_rt_scenes.automatic import automatic_cameras
+from hybrid_rt_scenes.given import GivenCamera, given_cameras
 from hybrid_rt_scenes.importing import ImportedScene, import_scene
 from hybrid_rt_scenes.places import data_directories, data_directory
 from hybrid_rt_scenes.registry import (
@@ -23,6 +24,7 @@ from hybrid_rt_scenes.spec import (
 __all__ = [
     "SCENES",
     "CameraSpec",
+    "GivenCamera",
     "ImportedScene",
     "LightsSpec",
     "MeshSpec",
@@ -33,6 +35,7 @@ __all__ = [
     "data_directories",
     "data_directory",
     "get_scene",
+    "given_cameras",
     "import_scene",
     "read_definition",
     "register",

@@ -2,11 +2,34 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import typer
+
 from hybrid_rt_bench.cli import terminal
 
 
-def info() -> None:
-    """Show versions, CPU, Embree's choice, where scenes are kept, what would spoil measurements."""
+def info(
+    what: Annotated[
+        str | None,
+        typer.Argument(help="A mesh, a definition, a file of cameras, or a scene by name."),
+    ] = None,
+) -> None:
+    """Show what is in a file; or versions, CPU, where scenes are kept, problems of measuring.
+
+    Of a mesh: triangles, objects, bounds and cameras.
+
+    Examples
+    --------
+    * `hybrid-rt info` - this machine
+
+    * `hybrid-rt info hall.glb`
+    """
+    if what is not None:
+        from hybrid_rt_bench.cli import contents
+
+        contents.show(what)
+        return
     import numba
     from rich.table import Table
 
