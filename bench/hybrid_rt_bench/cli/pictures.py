@@ -100,14 +100,15 @@ def render(scene: hrt.Scene, camera: hrt.Camera, what: What, threads: int | None
 def depth_image(gbuffer: hrt.GBuffer) -> U8:
     """Return the distance, near bright and far dark on a logarithmic scale; cream where none.
 
-    The ends of the scale are the 1st and 99th percentile of the distances in view.
+    Of parallel lines of sight the scale is linear, as their depth is. The ends of the scale are the 1st and 99th percentile of the distances in view.
     """
     covered = gbuffer.prim_id >= 0
     image = np.full((*covered.shape, 3), BACKGROUND, np.uint8)
     if covered.any():
-        log_depth = np.log(gbuffer.depth[covered])
-        low, high = np.quantile(log_depth, [0.01, 0.99])
-        scaled = np.clip((log_depth - low) / max(high - low, 1e-6), 0, 1)
+        depth = gbuffer.depth[covered]
+        scale = depth if gbuffer.camera.parallel else np.log(depth)
+        low, high = np.quantile(scale, [0.01, 0.99])
+        scaled = np.clip((scale - low) / max(high - low, 1e-6), 0, 1)
         image[covered] = (255 * mpl.colormaps["cividis"](scaled)[:, :3]).astype(np.uint8)
     return image
 

@@ -31,8 +31,8 @@ def normals(gbuffer: hrt.GBuffer) -> F32:
     scene = gbuffer.known_scene
     corners = scene.vertices[scene.faces[gbuffer.prim_id[covered]]]
     n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    towards = np.asarray(gbuffer.camera.eye, np.float32) - corners[:, 0]
-    out[covered] = _facing(n, towards)
+    away = gbuffer.camera.towards(corners[:, 0].astype(np.float64)).astype(np.float32)
+    out[covered] = _facing(n, -away)
     return out
 
 
@@ -63,7 +63,7 @@ def shaded(gbuffer: hrt.GBuffer, rays: hrt.Rays, tracer: hrt.EmbreeTracer, sampl
             tracer, rays, np.broadcast_to(SUN, n_ray.shape)
         )
         open_sky = _smoothed(_openness(gbuffer, rays, n_ray, tracer, samples), gbuffer, n)[y, x]
-        view = rays.origin - np.asarray(gbuffer.camera.eye, np.float32)
+        view = gbuffer.camera.towards(rays.origin.astype(np.float64)).astype(np.float32)
         head = np.abs(np.einsum("ij,ij->i", n_ray, view)) / np.linalg.norm(view, axis=1)
         hemisphere = 0.75 + 0.25 * n_ray[:, 1]
         ambient = (open_sky * (0.56 * hemisphere + 0.18 * head))[:, None]

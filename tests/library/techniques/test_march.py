@@ -55,9 +55,7 @@ def test_agrees_with_the_oracle(seed, samples):
                 buffer.depth,
                 buffer.ddx,
                 buffer.ddy,
-                camera.pixel_from_world,
-                camera.eye,
-                camera.near,
+                camera,
             )
             total += 1
             if expected.margin < MARGIN:
