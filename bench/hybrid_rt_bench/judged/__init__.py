@@ -4,7 +4,7 @@ from hybrid_rt_bench.options import TECHNIQUES, VIEWS
 from hybrid_rt_bench.registry import Kind
 
 
-def judging(name: str, package: str, spec: str, tables: str) -> Kind:
+def judging(name: str, package: str, spec: str, tables: str, frames: str = "") -> Kind:
     """Return a kind that judges: its own are its TOML files, its class and its tables."""
     return Kind(
         name,
@@ -15,4 +15,5 @@ def judging(name: str, package: str, spec: str, tables: str) -> Kind:
         tables=tables,
         figures=("hybrid_rt_bench.judged.figures:plots", "hybrid_rt_bench.judged.maps:figures"),
         options=(*VIEWS, TECHNIQUES),
+        frames=frames,
     )
