@@ -370,8 +370,8 @@ def march(
 
     Notes
     -----
-    In "paper" free space is proven at pixel centres only, so 0.5 to 2 % of the answers are wrong by
-    more than a pixel (``hybrid-rt run paper`` measures the rate). "slope" proves it over whole
+    In "paper" free space is proven at pixel centres only, so some of the answers are wrong by more
+    than a pixel (``hybrid-rt run paper`` measures the rate). "slope" proves it over whole
     pixels, but only for the planes that the pixels show. "linear", "dda" and "hiz" guess a
     thickness, and are wrong wherever it is; "hiz" also answers rays with a miss.
 
