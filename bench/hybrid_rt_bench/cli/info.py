@@ -6,10 +6,11 @@ from hybrid_rt_bench.cli import terminal
 
 
 def info() -> None:
-    """Show versions, CPU, what Embree chose, and problems that would spoil measurements."""
+    """Show versions, CPU, what Embree chose, scenes, and problems that would spoil measurements."""
     import numba
     from rich.table import Table
 
+    import hybrid_rt_scenes as hrs
     from hybrid_rt_bench.measure import environment as env
 
     out = terminal.out()
@@ -22,7 +23,14 @@ def info() -> None:
         elif key == "memory_bytes":
             key, value = "memory", f"{value / 2**30:.1f} GiB"
         table.add_row(key.replace("_", " "), str(value))
+    specs = [hrs.get_scene(name) for name in hrs.scene_names()]
+    there = [spec for spec in specs if spec.missing() is None]
+    named = (f"{spec.name} ({spec.mark})" if spec.mark else spec.name for spec in there)
+    table.add_row("scenes", ", ".join(named))
     out.print(table)
+    for spec in there:
+        if spec.mark:
+            out.print(f"{spec.name}, {spec.mark}: {spec.note}.", soft_wrap=True, highlight=False)
     problems = env.problems(found)
     if not problems:
         out.print("no problems found", style="green")

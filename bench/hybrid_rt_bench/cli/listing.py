@@ -47,8 +47,10 @@ def _scenes() -> None:
         state = "built in" if spec.builtin else "missing" if absent else "found"
         if absent:
             missing.append(absent)
-        named = Text.assemble(name, "\n", (state, "dim"))
-        rows.append((named, "\n".join(spec.cameras), spec.description))
+        mark = f", {spec.mark}" if spec.mark else ""
+        named = Text.assemble(name, "\n", (state + mark, "dim"))
+        note = f"\n{spec.mark}: {spec.note}" if spec.mark else ""
+        rows.append((named, "\n".join(spec.cameras), spec.description + note))
     _table("Scenes", ("scene", "cameras", "what it is"), rows)
     out.print(f"Real scenes are looked for in {hrs.data_directory()}", soft_wrap=True)
     for text in missing:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from hybrid_rt_bench.report.markdown import document
+from hybrid_rt_bench.report.scenes import with_scene_notes
 from hybrid_rt_bench.report.table import Table
 from hybrid_rt_bench.results.files import ReportsError, reason, write_bytes
 from hybrid_rt_bench.results.folder import RunData
@@ -38,7 +39,7 @@ def render_run(
     ReportsError
         The run's folder cannot be written to.
     """
-    made = tables(run)
+    made = with_scene_notes(run, tables(run))
     written = [run.folder / "tables.md"]
     write_bytes(written[0], document(run, made).encode())
     folder = run.folder / "figures"

@@ -489,7 +489,7 @@ def test_the_report_is_made_of_the_files_alone(tmp_path):
 def test_the_figure_has_a_panel_a_scene_and_says_what_did_not_run(tmp_path):
     figure = peers_figures.rates(read_run(write_run(tmp_path)))
     assert [ax.get_title() for ax in figure.axes] == [
-        "hall (1046 triangles)", "yard (1046 triangles)"
+        "hall, 1046 triangles", "yard, 1046 triangles"
     ]  # fmt: skip
     names = [label.get_text() for label in figure.axes[0].get_yticklabels()]
     assert names == ["embree, 2 t", "quick, 2 t", "absent"]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from hybrid_rt_bench.report.scenes import scene_name
 from hybrid_rt_bench.report.table import Table, interval, number
 from hybrid_rt_bench.results import statistics as stats
 from hybrid_rt_bench.results.folder import RunData
@@ -265,7 +266,7 @@ def views_text(run: RunData) -> str:
 
 
 def scene_label(run: RunData, scene: str) -> str:
-    """Return a scene's name with its number of triangles."""
+    """Return a scene's name with its mark, if it has one, and its number of triangles."""
     n = next(int(e["triangles"]) for e in run.meta["scenes"] if e["name"] == scene)
     count = f"{n}" if n < 10_000 else f"{n / 1e3:.0f}k" if n < 1e6 else f"{n / 1e6:.2f}M"
-    return f"{scene} ({count} triangles)"
+    return f"{scene_name(run, scene)}, {count} triangles"
