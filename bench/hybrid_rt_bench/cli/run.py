@@ -89,11 +89,12 @@ def run(
         "broken": list(outcome.broken),
     }
     if outcome.measured:
-        from hybrid_rt_bench.runs import read_run
+        from hybrid_rt_bench.runs import read_run, verdict_of
 
         data = read_run(outcome.folder, out_dir)
         written = rendered(data, show=not as_json)
         summary |= {
+            "verdict": verdict_of(data),
             "notes": data.meta["notes"],
             "warnings": data.meta["warnings"],
             "results": _records(data),

@@ -11,6 +11,7 @@ register(
         run=".run:run_roofline",
         schema=".columns:SCHEMA",
         tables=".tables:tables",
+        verdict=".verdict:verdict",
         figures=(".figures:plots",),
         options=VIEWS,
     )
