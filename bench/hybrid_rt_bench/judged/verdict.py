@@ -11,7 +11,7 @@ from hybrid_rt_bench.judged.pooling import Pooled, pools
 from hybrid_rt_bench.judged.tables import common, defaults, timed
 from hybrid_rt_bench.judged.text import pays, plain, power
 from hybrid_rt_bench.report.table import interval, number, rate_words
-from hybrid_rt_bench.report.words import counted, how_many, listed, named
+from hybrid_rt_bench.report.words import MOST_NAMED, counted, how_many, listed, named
 from hybrid_rt_bench.results import statistics as stats
 from hybrid_rt_bench.results.folder import RunData
 
@@ -37,9 +37,10 @@ def speedups(
 def where(rows: pd.DataFrame) -> str:
     """Return in words which cells rows are of."""
     scenes = named([str(s) for s in dict.fromkeys(rows["scene"])], "scene")
-    workloads = named([plain(str(w)) for w in dict.fromkeys(rows["workload"])], "kind")
+    workloads = [plain(str(w)) for w in dict.fromkeys(rows["workload"])]
+    rays = f"{listed(workloads)} rays" if len(workloads) <= MOST_NAMED else "many kinds of rays"
     keys = ["scene", "camera", "width", "height", "workload", "seed"]
-    return f"{counted(len(rows[keys].drop_duplicates()), 'cell')} ({scenes}; {workloads} rays)"
+    return f"{counted(len(rows[keys].drop_duplicates()), 'cell')} ({scenes}; {rays})"
 
 
 def speedup_words(speedup: stats.Estimate | None) -> str:

@@ -122,7 +122,7 @@ def _one(
         return f"| {' | '.join(cells)} |"
 
     def heading(text: str) -> str:
-        broken = BREAK.join(_broken(text, width - 8 - 2 * len(taken)))
+        broken = BREAK.join(_broken(text, width - 5 - 3 * len(taken)))
         return f"| **{broken}** |{' |' * (len(taken) - 1)}"
 
     rule = "".join(f"{'-' * (widths[at] + 1)}:|" if at else f"{'-' * (widths[0] + 2)}|"

@@ -14,6 +14,12 @@ def listed(items: Iterable[str]) -> str:
     return f"{', '.join(others)} and {last}" if others else last
 
 
+def few(items: Sequence[str]) -> str:
+    """Return the first items as `listed` does, and how many more there are."""
+    more = len(items) - MOST_NAMED
+    return listed(items) if more < 1 else listed([*items[:MOST_NAMED], f"{more} more"])
+
+
 def counted(number: int, word: str) -> str:
     """Return a number of things, with an s where there is not one of them."""
     return f"{number:,} {word}{'' if number == 1 else 's'}"

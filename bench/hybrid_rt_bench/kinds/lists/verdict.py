@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from hybrid_rt_bench.judged.pooling import Pooled
 from hybrid_rt_bench.judged.tables import shared
 from hybrid_rt_bench.judged.verdict import (
@@ -23,7 +25,7 @@ def verdict(run: RunData) -> str:
     found = by_point(rows)
     if not found:
         return f"No cell was timed. {strict_words(run.results)}".strip()
-    order = sorted(found, key=lambda name: found[name].mean("lists_mib"))
+    order = sorted(found, key=lambda name: np.nan_to_num(found[name].mean("lists_mib")))
     first, last = order[0], order[-1]
     said = [f"Over {where(rows)}, {first} resolves {_what(found[first])}"]
     if first != last:
@@ -40,8 +42,8 @@ def verdict(run: RunData) -> str:
 
 
 def _what(pooled: Pooled) -> str:
-    return (
-        f"{number(100 * pooled.alpha)} % of the rays with lists of "
-        f"{number(pooled.mean('lists_mib'))} MiB per view, made in "
-        f"{number(pooled.mean('prepare_ms'))} ms"
-    )
+    text = f"{number(100 * pooled.alpha)} % of the rays"
+    size = pooled.mean("lists_mib")
+    if size > 0:
+        text += f" with lists of {number(size)} MiB per view"
+    return f"{text}, {number(pooled.mean('prepare_ms'))} ms per view to prepare"

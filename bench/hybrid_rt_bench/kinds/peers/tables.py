@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from hybrid_rt.judging.rate import Rate
+from hybrid_rt_bench.kinds.peers.columns import SCHEMA
 from hybrid_rt_bench.report.scenes import scene_name
 from hybrid_rt_bench.report.table import DASH, Table, interval, number, rate_text
 from hybrid_rt_bench.report.words import listed
@@ -83,8 +84,8 @@ def pictures(run: RunData) -> Table:
          "same primitive, % of pixels", "depth off, p50", "depth off, p99", "depth off, largest",
          "first draw, ms"],
     )  # fmt: skip
-    drawn = run.results[run.results.workload == RASTER]
-    for scene, part in by_scene(drawn):
+    every = drawn(run)
+    for scene, part in by_scene(every):
         table.rows.append([scene_label(run, scene)])
         for name, rows in _by_peer(part):
             done = ok(rows)
@@ -113,7 +114,7 @@ def pictures(run: RunData) -> Table:
         "LP_NUM_THREADS is set to the number of threads. llvmpipe starts so many for its tiles; "
         "vertices, clipping and binning stay on the calling thread.",
     ]
-    table.notes += _reasons(run, drawn)
+    table.notes += _reasons(run, every)
     return table
 
 
@@ -127,7 +128,7 @@ def agreement(run: RunData) -> Table:
         detail=True,
     )  # fmt: skip
     for workload in TRACED:
-        rows = ok(run.results[run.results.workload == workload])
+        rows = ok(_whole(run.results[run.results.workload == workload]))
         if len(rows):
             table.rows.append([f"{workload} rays, all scenes"])
         for name, part in _by_peer(rows):
@@ -135,7 +136,7 @@ def agreement(run: RunData) -> Table:
                 [
                     name,
                     f"{int(part.rays.sum()):,}",
-                    f"{int(part.different.sum()):,}",
+                    f"{int(part.different.sum()):,}" if part.different.notna().any() else DASH,
                     _rate(part.different, part.rays),
                     _rate(part.same_place * part.rays, part.rays),
                     _rate(part.early * part.rays, part.rays),
@@ -207,8 +208,13 @@ def rate(rows: pd.DataFrame) -> float:
 
 
 def traced(run: RunData) -> pd.DataFrame:
-    """Return the rows of what traces rays."""
-    return run.results[run.results.workload != RASTER]
+    """Return the rows of what traces rays, with NaN for what no peer of the run could tell."""
+    return _whole(run.results[run.results.workload != RASTER])
+
+
+def drawn(run: RunData) -> pd.DataFrame:
+    """Return the rows of what draws, as `traced`."""
+    return _whole(run.results[run.results.workload == RASTER])
 
 
 def ok(rows: pd.DataFrame) -> pd.DataFrame:
@@ -228,9 +234,11 @@ def _by_peer(rows: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
 def ratio(run: RunData, rows: pd.DataFrame) -> str:
     """Return the geometric mean over views of the ratio of times, from the raw samples."""
     keys = ["scene", "camera", "width", "height", "technique", "workload"]
-    mine = run.samples.merge(rows[[*keys, "rays"]], on=keys) if len(rows) else pd.DataFrame()
+    if rows.empty or run.samples.empty:
+        return DASH
+    mine = run.samples.merge(rows[[*keys, "rays"]], on=keys)
     groups = []
-    for _, part in mine.groupby(keys, sort=False) if len(mine) else ():
+    for _, part in mine.groupby(keys, sort=False):
         seconds, rays, beside, amount = (
             part[c].to_numpy(np.float64) for c in ("seconds", "rays", "beside", "beside_rays")
         )
@@ -248,6 +256,8 @@ def _pooled(rows: pd.DataFrame, column: str) -> float:
 
 def _share(value: float) -> str:
     """Return a share near 1 in per cent, with as many nines as it has."""
+    if not np.isfinite(value):
+        return DASH
     return "100" if value == 1 else f"{100 * value:.4f}"
 
 
@@ -255,9 +265,16 @@ def _power(value: float) -> str:
     return DASH if not np.isfinite(value) else "0" if value == 0 else f"{value:.1e}"
 
 
+def _whole(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return rows with all columns; those that are optional are absent where no peer has them."""
+    return rows.reindex(columns=list(dict.fromkeys([*SCHEMA.tables["results"], *rows.columns])))
+
+
 def _rate(counts: Any, rays: Any) -> str:
-    """Return the share of rays that were counted."""
-    return rate_text(Rate.of(round(float(counts.sum())), int(rays.sum())))
+    """Return the share of rays that were counted; a dash where nobody did."""
+    if counts.isna().all():
+        return DASH
+    return rate_text(Rate.of(round(float(counts.sum())), int(rays[counts.notna()].sum())))
 
 
 def _not_run(table: Table, name: str) -> list[str]:

@@ -6,7 +6,7 @@ import pandas as pd
 
 from hybrid_rt.judging.rate import Rate
 from hybrid_rt_bench.kinds.peers import tables
-from hybrid_rt_bench.report.table import number, rate_words
+from hybrid_rt_bench.report.table import DASH, number, rate_words
 from hybrid_rt_bench.report.words import MOST_NAMED, counted, listed
 from hybrid_rt_bench.results.folder import RunData
 
@@ -45,9 +45,11 @@ def _rates(run: RunData, mirror: pd.DataFrame) -> str:
             f"the strongest Embree traces {number(rates.pop(STRONGEST))} M mirror rays per second"
         )
     order = sorted(rates, key=lambda name: -rates[name])
-    parts = [f"{name} {tables.ratio(run, found[name])}" for name in order[: 2 * MOST_NAMED]]
+    ratios = {name: tables.ratio(run, found[name]) for name in order}
+    order = [name for name in order if ratios[name] != DASH]
+    parts = [f"{name} {ratios[name]}" for name in order[: 2 * MOST_NAMED]]
     if not parts:
-        return f"{text}."
+        return f"{text}." if text else ""
     lead = f"{text}; " if text else ""
     more = f" ({len(order) - len(parts)} slower ones left out)" if len(parts) < len(order) else ""
     return f"{lead}the time of the others, over its time: {listed(parts)}{more}."
@@ -58,7 +60,7 @@ def _agreement(traced: pd.DataFrame) -> str:
     rates = {
         str(name): Rate.of(int(rows.different.sum()), int(rows.rays.sum()))
         for name, rows in traced.groupby("technique", sort=False)
-        if name != STRONGEST and int(rows.rays.sum())
+        if name != STRONGEST and rows.different.notna().all()
     }
     if not rates:
         return ""
@@ -73,12 +75,13 @@ def _agreement(traced: pd.DataFrame) -> str:
 
 
 def _raster(run: RunData) -> str:
-    drawn = tables.ok(run.results[run.results.workload == tables.RASTER])
-    parts = [
-        f"{name} {tables.ratio(run, rows)}"
+    drawn = tables.ok(tables.drawn(run))
+    ratios = {
+        str(name): tables.ratio(run, rows)
         for name, rows in drawn.groupby("technique", sort=False)
         if name != tables.RASTER
-    ]
+    }
+    parts = [f"{name} {ratio}" for name, ratio in ratios.items() if ratio != DASH]
     return (
         f"Drawing the same picture takes, over the time of our raster: {listed(parts)}."
         if parts

@@ -46,7 +46,9 @@ def _of(run: RunData, threads: str, rows: pd.DataFrame) -> list[str]:
             "and its gathers, at the machine's fastest rate, "
             f"{_range(pd.Series(near / budget))} times."
         )
-    best: Any = rows.sort_values("speedup", kind="stable").iloc[-1]
+    if rows.speedup.isna().all():
+        return said
+    best: Any = rows.sort_values("speedup", kind="stable", na_position="first").iloc[-1]
     said.append(
         "The largest measured speed-up over the strongest Embree is "
         f"{interval(best.speedup, best.speedup_low, best.speedup_high)}, in {view(run, best)}."

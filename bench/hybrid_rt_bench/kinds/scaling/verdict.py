@@ -23,7 +23,7 @@ from hybrid_rt_bench.kinds.scaling.tables import (
     stages_of,
 )
 from hybrid_rt_bench.report.table import number
-from hybrid_rt_bench.report.words import listed
+from hybrid_rt_bench.report.words import MOST_NAMED, counted, few
 from hybrid_rt_bench.results import exponents
 from hybrid_rt_bench.results.folder import RunData
 
@@ -31,10 +31,13 @@ from hybrid_rt_bench.results.folder import RunData
 def verdict(run: RunData) -> str:
     """Return how march, hybrid and Embree grow in each series, and the largest peak of memory."""
     said = []
-    for name in series_names(run):
+    every = series_names(run)
+    for name in every[:MOST_NAMED]:
         axis = str(of_series(run, name).axis.iloc[0])
         say = {"triangles": _triangles, "pixels": _pixels, "threads": _threads}[axis]
         said.append(say(run, name))
+    if len(every) > MOST_NAMED:
+        said.append(f"{counted(len(every) - MOST_NAMED, 'further series')} in the tables.")
     peaks = run.results[run.results.peak_bytes > 0]
     if len(peaks):
         most: Any = peaks.sort_values("peak_bytes", kind="stable").iloc[-1]
@@ -56,11 +59,11 @@ def _triangles(run: RunData, name: str) -> str:
     if (first, last) == (FROM, TO):
         marches = [growth for growth in found if growth.key[1] == "march"]
         parts = [f"{goal_said(growth.ratio)} by {growth.key[0]}" for growth in marches]
-        goal = f" (the goal, below {GOAL} for a march, is {listed(parts)})" if parts else ""
+        goal = f" (the goal, below {GOAL} for a march, is {few(parts)})" if parts else ""
     grown = [f"{ratio_text(growth.ratio)} for {_name(growth.key)}" for growth in found]
     return (
         f"From {names[first]} to {names[last]} triangles at a fixed view (series {name}) the time "
-        f"grows by a factor of {listed(grown)}{goal}. {_beside(part, last)}"
+        f"grows by a factor of {few(grown)}{goal}. {_beside(part, last)}"
     )
 
 
@@ -77,7 +80,7 @@ def _pixels(run: RunData, name: str) -> str:
     first, last = min(names), max(names)
     return (
         f"From {names[first]} to {names[last]} (series {name}) the time goes with the number of "
-        f"pixels to the power of {listed(parts)}. {_beside(part, last)}"
+        f"pixels to the power of {few(parts)}. {_beside(part, last)}"
     )
 
 
@@ -93,7 +96,7 @@ def _threads(run: RunData, name: str) -> str:
         if first in by.index and last in by.index:
             parts.append(f"{_name(key)} is {number(by[first] / by[last])}")
     return (
-        f"With {last} threads in place of {first} (series {name}) {listed(parts)} times as fast. "
+        f"With {last} threads in place of {first} (series {name}) {few(parts)} times as fast. "
         f"{_beside(part, last)}"
     )
 
@@ -118,7 +121,7 @@ def _beside(part: pd.DataFrame, x: int) -> str:
     if axis != "pixels":
         place += f" {axis}" if x != 1 else f" {axis.removesuffix('s')}"
     return (
-        f"At {place} the hybrid takes {listed(parts)} the time of the strongest Embree for "
+        f"At {place} the hybrid takes {few(parts)} the time of the strongest Embree for "
         "every ray (ratios of medians)."
     )
 
