@@ -38,7 +38,7 @@ class Paper(stepping.Sampled):
 
     name = "paper"
     description = (
-        "The paper's strict march through a nearest-depth pyramid, then Embree for the rest"
+        "The paper's strict march through a nearest-depth pyramid, then Embree for unresolved rays"
     )
     reference = "Pikulsky 2025"
 

@@ -68,7 +68,7 @@ def run(
 
     * `hybrid-rt run peers --quick` - the same rays and pictures through other programs
 
-    * `hybrid-rt run roofline --quick` - what the certified march reads, takes and may take
+    * `hybrid-rt run roofline --quick` - what the certified march takes, and its break-even
     """
     from hybrid_rt_bench.experiments import load_experiment
 

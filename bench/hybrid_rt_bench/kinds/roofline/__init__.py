@@ -1,4 +1,4 @@
-"""What the certified march does, reads and takes, and what it may take on this machine."""
+"""What the certified march does, reads and takes on this machine, and where it breaks even."""
 
 from hybrid_rt_bench.options import VIEWS
 from hybrid_rt_bench.registry import Kind, register
