@@ -30,6 +30,9 @@ from hybrid_rt_bench.results.folder import RunData
 
 Samples = dict[str, Any]
 
+VIEWS = ["scene", "camera", "width", "height"]
+"""Columns that tell views apart."""
+
 
 def tables(run: RunData) -> list[Table]:
     """Return every table of the run, in the order of reading."""
@@ -50,12 +53,12 @@ def table_1(run: RunData) -> Table:
     """Return Table 1: the mean time of the march."""
     columns = _resolutions(run)
     table = Table("Table 1. March (SSRM), mean time in ms", ["", *columns])
+    parts = {"all scenes": common(run.results)}
+    parts |= {label(run, scene): of_scene(run, scene) for scene in scenes(run)}
     for technique in techniques(run):
-        rows = of_technique(run.results, technique)
-        parts = {"all scenes": rows}
-        parts |= {label(run, scene): rows[rows.scene == scene] for scene in scenes(run)}
         for name, part in parts.items():
-            cells = _by_resolution(part, columns, lambda r: number(r.march_ms.mean()))
+            rows = of_technique(part, technique)
+            cells = _by_resolution(rows, columns, lambda r: number(r.march_ms.mean()))
             table.rows.append([f"{technique}: {name}", *cells])
     table.rows.append([f"{QUOTED}, its own scenes", *_quote(paper.SSRM_MS, columns)])
     table.notes.append(
@@ -114,19 +117,20 @@ def table_alpha(run: RunData) -> Table:
     """Return the share of resolved rays, for each scene and camera."""
     columns = _resolutions(run)
     table = Table("Alpha: share of rays that the screen answers", ["", *columns])
+
+    def cells(part: pd.DataFrame, technique: str) -> list[str]:
+        rows = of_technique(part, technique)
+        return _by_resolution(rows, columns, lambda r: f"{r.alpha.mean():.3f}")
+
     for technique in techniques(run):
-        rows = of_technique(run.results, technique)
-
-        def cells(part: pd.DataFrame) -> list[str]:
-            return _by_resolution(part, columns, lambda r: f"{r.alpha.mean():.3f}")
-
         for scene in scenes(run):
-            part = rows[rows.scene == scene]
+            part = run.results[run.results.scene == scene]
             table.rows.append([f"{technique}: {label(run, scene)}"])
             for camera in ordered(part.camera):
-                table.rows.append([camera, *cells(part[part.camera == camera])])
-            table.rows.append(["mean of the cameras", *cells(part)])
-        table.rows += [[f"{technique}: all scenes"], ["mean of all views", *cells(rows)]]
+                table.rows.append([camera, *cells(part[part.camera == camera], technique)])
+            table.rows.append(["mean of the cameras", *cells(of_scene(run, scene), technique)])
+        whole = cells(common(run.results), technique)
+        table.rows += [[f"{technique}: all scenes"], ["mean of all views", *whole]]
     table.rows.append([f"{QUOTED}, its own scenes", *[f"{paper.ALPHA:.2f}" for _ in columns]])
     table.notes.append("Technique: scene. The paper gives one mean over scenes and sizes.")
     return table
@@ -274,13 +278,14 @@ def table_embree(run: RunData) -> Table:
     return table
 
 
-def samples_of(run: RunData, technique: str) -> Iterator[tuple[Any, Samples]]:
-    """Yield each results row of a technique with its measured samples by stage."""
+def samples_of(
+    run: RunData, technique: str, rows: pd.DataFrame | None = None
+) -> Iterator[tuple[Any, Samples]]:
+    """Yield each row of a technique, of all results or of `rows`, with its samples by stage."""
     measured = run.samples[run.samples.phase == "measured"]
-    keys = ["scene", "camera", "width", "height"]
-    groups = dict(list(measured.groupby(keys)))
-    for _, row in of_technique(run.results, technique).iterrows():
-        group = groups[tuple(row[k] for k in keys)]
+    groups = dict(list(measured.groupby(VIEWS)))
+    for _, row in of_technique(run.results if rows is None else rows, technique).iterrows():
+        group = groups[tuple(row[k] for k in VIEWS)]
         group = group[group.technique.isin(["", technique])].sort_values("round")
         yield row, {str(stage): part.seconds.to_numpy() for stage, part in group.groupby("stage")}
 
@@ -294,8 +299,8 @@ def _speedup(
 ) -> str:
     ratios = [
         speedup(samples, row.alpha)
-        for row, samples in samples_of(run, technique)
-        if row.scene == scene and size_of(row) == resolution
+        for row, samples in samples_of(run, technique, of_scene(run, scene))
+        if size_of(row) == resolution
     ]
     if not ratios:
         return ABSENT
@@ -380,9 +385,21 @@ def of_technique(frame: pd.DataFrame, technique: str) -> pd.DataFrame:
     return frame[frame.technique == technique]
 
 
+def common(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of the views that have every technique of `rows`; all rows if none has."""
+    of_view = rows.groupby(VIEWS)["technique"].transform("size")
+    whole = rows[of_view == rows["technique"].nunique()]
+    return whole if len(whole) else rows
+
+
+def of_scene(run: RunData, scene: str) -> pd.DataFrame:
+    """Return the rows of a scene, of the views that every technique measured there has."""
+    return common(run.results[run.results.scene == scene])
+
+
 def _views(run: RunData) -> pd.DataFrame:
     """Return a row for each cell: what belongs to all techniques is the same in all of its rows."""
-    return run.results.drop_duplicates(["scene", "camera", "width", "height"])
+    return run.results.drop_duplicates(VIEWS)
 
 
 def _largest(run: RunData) -> pd.DataFrame:

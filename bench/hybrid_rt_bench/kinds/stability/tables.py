@@ -14,7 +14,8 @@ COUNTS = ("false_hit", "false_miss", "wrong_primitive", "imprecise", "false_free
 
 def tables(run: RunData) -> list[Table]:
     """Return every table of the run, in the order of reading."""
-    return [summary(run), verdicts(run), unresolved(run), offenders(run), what_goes_wrong(run)]
+    made = [summary(run), verdicts(run), unresolved(run), offenders(run), what_goes_wrong(run)]
+    return [table for table in made if table.rows]
 
 
 def summary(run: RunData) -> Table:
