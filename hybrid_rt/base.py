@@ -17,7 +17,7 @@ from dataclasses import dataclass, fields
 from typing import Any, ClassVar, NoReturn, Protocol, TypeVar
 
 from hybrid_rt import _check, _threads
-from hybrid_rt.camera.pinhole import Camera
+from hybrid_rt.camera.camera import Camera
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels.arrays import Bool
 from hybrid_rt.raster.gbuffer import GBuffer

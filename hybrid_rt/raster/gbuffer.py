@@ -8,7 +8,7 @@ import numpy as np
 
 from hybrid_rt import _check
 from hybrid_rt._record import Record
-from hybrid_rt.camera.pinhole import Camera, unproject
+from hybrid_rt.camera.camera import Camera, unproject
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels.arrays import F32, F64, I32, Bool, GBufferArrays
 from hybrid_rt.scene.mesh import Scene
@@ -21,7 +21,8 @@ class GBuffer(Record):
     Attributes
     ----------
     depth : (H, W) float32
-        ``near / z_view`` at the pixel's centre, 0 where nothing is visible.
+        At the pixel's centre, 0 where nothing is visible: ``near / z_view`` of a pinhole camera,
+        ``(far - z_view) / (far - near)`` of an orthographic one.
     ddx, ddy : (H, W) float32
         Change of `depth` for one pixel to the right and one pixel down.
     prim_id : (H, W) int32
@@ -113,7 +114,7 @@ class GBuffer(Record):
         normals = np.cross(b - a, c - a)
         with np.errstate(invalid="ignore"):
             normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        away = np.einsum("ij,ij->i", normals, a - np.array(self.camera.eye)) > 0
+        away = np.einsum("ij,ij->i", normals, self.camera.towards(a)) > 0
         normals[away] *= -1.0
         return self._image_of(covered, normals[of_pixel])
 

@@ -69,7 +69,7 @@ class PixelDDA(Technique):
     def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
         camera = screen.camera
         numbers = PixelDDANumbers(
-            stepping.length_in(screen.scene, self.thickness) / camera.near,
+            *camera.receding(stepping.length_in(screen.scene, self.thickness)),
             int(self.stride),
             float(self.jitter),
             int(self.max_steps or camera.width + camera.height + 2),

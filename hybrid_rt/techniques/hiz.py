@@ -114,9 +114,11 @@ class HiZ(Technique):
         return build_depth_pyramid(gbuffer, threads=threads)
 
     def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
+        camera = screen.camera
         numbers = HiZNumbers(
             stepping.length_in(screen.scene, self.thickness),
-            screen.camera.near,
+            camera.far - camera.near if camera.parallel else camera.near,
+            camera.parallel,
             float(self.threshold),
             float(self.border),
             bool(self.exhausted_hits),

@@ -30,7 +30,8 @@ class Linear(Technique):
     stride : float
         Length of a step as a fraction of z_view where the ray starts, > 0. A step parallel to the
         image is then ``stride * focal_px`` pixels long, 1.7 % of the image's height for 0.02 at a
-        field of view of 60 degrees, whatever the scene's unit and the start's distance.
+        field of view of 60 degrees, whatever the scene's unit and the start's distance. Of an
+        orthographic camera, as a fraction of what the image's height shows.
     refinements : int
         Halvings, 0 to 32.
     max_steps : int
@@ -80,9 +81,12 @@ class Linear(Technique):
         return [*points, Point(f"thickness {usual.thickness}, unrefined", cls(refinements=0))]
 
     def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
-        thickness = stepping.length_in(screen.scene, self.thickness) / screen.camera.near
+        camera = screen.camera
         numbers = LinearNumbers(
-            thickness, float(self.stride), int(self.refinements), int(self.max_steps)
+            *camera.receding(stepping.length_in(screen.scene, self.thickness)),
+            float(self.stride) * camera.stride_unit,
+            int(self.refinements),
+            int(self.max_steps),
         )
         return stepping.march(rays, screen, None, numbers, threads)
 

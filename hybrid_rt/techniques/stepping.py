@@ -9,7 +9,7 @@ import numpy as np
 
 from hybrid_rt import _check, _threads
 from hybrid_rt.base import Point, Screen, Technique
-from hybrid_rt.camera.pinhole import Camera
+from hybrid_rt.camera.camera import Camera
 from hybrid_rt.kernels.techniques import driver
 from hybrid_rt.raster.pyramid import Pyramid
 from hybrid_rt.rays.marched import Marched

@@ -14,7 +14,7 @@ from hybrid_rt_bench.cli import terminal
 from hybrid_rt_bench.cli.common import Threads
 
 if TYPE_CHECKING:
-    from hybrid_rt.camera.pinhole import Camera
+    from hybrid_rt.camera.camera import Camera
 
 
 class What(StrEnum):
@@ -87,7 +87,7 @@ def _own_camera(
     eye: str | None, target: str | None, up: str, fov: float, camera: str | None
 ) -> Camera:
     """Return the camera that options place; its pixels and near plane are still to be chosen."""
-    from hybrid_rt.camera.pinhole import Camera
+    from hybrid_rt.camera.camera import Camera
 
     if camera is not None:
         raise ArgumentError("--camera", "none beside --eye and --target", repr(camera))

@@ -1,7 +1,7 @@
 """The perspective-correct pixel DDA of "Efficient GPU Screen-Space Ray Tracing", ray by ray.
 
-On the screen x, y and depth = near / z_view are linear in s, so equal steps of s are equal steps of
-pixels and 1 / z_view is interpolated, as the paper has it.
+On the screen x, y and depth are linear in s, so equal steps of s are equal steps of pixels and,
+where depth is near / z_view, 1 / z_view is interpolated, as the paper has it.
 """
 
 from __future__ import annotations
@@ -34,9 +34,10 @@ def nearest_s(level, z0, dz, low, high):
 
 
 class PixelDDANumbers(NamedTuple):
-    """Parameters of `hybrid_rt.PixelDDA`; `thickness` in units of the near plane's distance."""
+    """Parameters of `hybrid_rt.PixelDDA`; `slab_a`, `slab_b`: see `screen.slab_bottom`."""
 
-    thickness: float
+    slab_a: float
+    slab_b: float
     stride: int
     jitter: float
     max_steps: int
@@ -49,7 +50,8 @@ def dda_ray(numbers, buffers, pyramid, ray, own_x, own_y, steps_by_level):
     height, width = depth.shape
     x, y, z0 = np.float32(ray.x), np.float32(ray.y), np.float32(ray.depth)
     dx, dy, dz = np.float32(ray.dx), np.float32(ray.dy), np.float32(ray.dz)
-    thickness, stride = np.float32(numbers.thickness), np.float32(numbers.stride)
+    slab_a, slab_b = np.float32(numbers.slab_a), np.float32(numbers.slab_b)
+    stride = np.float32(numbers.stride)
     jitter, max_steps = np.float32(numbers.jitter), numbers.max_steps
     s_end = min(np.float32(ray.s_end), FAR)
     # A ray straight towards or away from the eye stays in its pixel: one sample is all of it.
@@ -73,7 +75,7 @@ def dda_ray(numbers, buffers, pyramid, ray, own_x, own_y, steps_by_level):
             surface = depth[j, i]
             a, b = z0 + dz * first, z0 + dz * last
             if surface > F0 and min(a, b) <= surface:
-                if max(a, b) >= slab_bottom(surface, thickness):
+                if max(a, b) >= slab_bottom(surface, slab_a, slab_b):
                     return HIT, True, i, j, nearest_s(surface, z0, dz, first, last), s_free, steps
                 passed = True
         if not passed:

@@ -106,34 +106,46 @@ def fade(place, size, margin):
 
 
 @inlined
-def faces_ray(i, j, depth, ddx, ddy, x0, y0, z0, dx, dy, dz):
+def faces_ray(i, j, depth, ddx, ddy, x0, y0, z0, dx, dy, dz, parallel):
     """Return whether the plane of pixel (i, j) is seen from the side that the ray comes from.
 
-    In homogeneous screen space the plane is ``near - (a q_x + b q_y + c q_z) = 0``, positive at the
-    eye; along the ray it falls if ``a dx + b dy - dz (c + a x0 + b y0) / z0 > 0``.
+    In homogeneous screen space the plane is ``q_d - (a q_x + b q_y + c q_w) = 0``, positive towards
+    the viewer. Along the ray of a pinhole, where q_d = near, it falls if
+    ``a dx + b dy - dz (c + a x0 + b y0) / z0 > 0``; of parallel lines of sight, where q_w = 1, if
+    ``a dx + b dy - dz > 0``.
     """
     a, b = ddx[j, i], ddy[j, i]
+    if parallel:
+        return a * dx + b * dy > dz
     plane = depth[j, i] + a * (x0 - np.float32(i) - HALF) + b * (y0 - np.float32(j) - HALF)
     return z0 * (a * dx + b * dy) > dz * plane
 
 
 @inlined
-def confidence(i, j, s, depth, ddx, ddy, x0, y0, z0, dx, dy, dz, near, thickness, margin):
+def confidence(
+    i, j, s, depth, ddx, ddy, x0, y0, z0, dx, dy, dz, unit, parallel, thickness, margin
+):  # fmt: skip
     """Return how far a stop at s in pixel (i, j) is to be trusted, 0 to 1; `margin` in pixels."""
     height, width = depth.shape
     ray, surface = z0 + dz * s, depth[j, i]
-    if ray <= F0 or surface <= F0 or not faces_ray(i, j, depth, ddx, ddy, x0, y0, z0, dx, dy, dz):
+    if ray <= F0 or surface <= F0:
         return F0
-    apart = abs(near / ray - near / surface)
+    if not faces_ray(i, j, depth, ddx, ddy, x0, y0, z0, dx, dy, dz, parallel):
+        return F0
+    apart = abs(ray - surface) * unit if parallel else abs(unit / ray - unit / surface)
     vignette = fade(x0 + dx * s, width, margin) * fade(y0 + dy * s, height, margin)
     return (F1 - smoothstep(apart / thickness)) * vignette
 
 
 class HiZNumbers(NamedTuple):
-    """Parameters of `hybrid_rt.HiZ`; `thickness` in world units, and the near plane's distance."""
+    """Parameters of `hybrid_rt.HiZ`; `thickness` in world units.
+
+    unit: the near plane's distance or, with `parallel` lines of sight, that of far and near plane.
+    """
 
     thickness: float
-    near: float
+    unit: float
+    parallel: bool
     threshold: float
     border: float
     exhausted_hits: bool
@@ -158,8 +170,8 @@ def hiz_ray(numbers, buffers, pyramid, ray, own_x, own_y, steps_by_level):
     if not judged:
         return how, False, -1, -1, s, s, count
     trust = confidence(
-        at_x, at_y, s, depth, ddx, ddy, x0, y0, z0, dx, dy, dz, np.float32(numbers.near),
-        np.float32(numbers.thickness), np.float32(numbers.border * height),
+        at_x, at_y, s, depth, ddx, ddy, x0, y0, z0, dx, dy, dz, np.float32(numbers.unit),
+        numbers.parallel, np.float32(numbers.thickness), np.float32(numbers.border * height),
     )  # fmt: skip
     if numbers.threshold <= trust:
         return how, True, at_x, at_y, s, s, count

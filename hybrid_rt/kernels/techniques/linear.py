@@ -1,8 +1,9 @@
 """The linear march in the world, one ray at a time.
 
-In units of z_view where the ray starts, the ray's length is u; with the cosine g between its
-direction and the camera's, ``z_view(u) = z (1 + u g)``, so the screen parameter of
-`kernels.screen`, for a direction of unit length, is ``s = u / (1 + u g)``.
+In units of w where the ray starts, which is z_view for a pinhole and 1 for parallel lines of sight,
+the ray's length is u; with what w grows by along a direction of unit length, g, which is its cosine
+with the camera's or 0, ``w(u) = w (1 + u g)``, so the screen parameter of `screen` is
+``s = u / (1 + u g)``.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ IN_FRONT, INSIDE, BEHIND = range(3)
 
 
 @inlined
-def look(s, x, y, z0, dx, dy, dz, own_x, own_y, depth, thickness):
+def look(s, x, y, z0, dx, dy, dz, own_x, own_y, depth, slab_a, slab_b):
     """Return where the ray's point at s is in respect of its pixel's slab, and the pixel."""
     height, width = depth.shape
     i = clamp(int(x + dx * s), 0, width - 1)
@@ -38,15 +39,19 @@ def look(s, x, y, z0, dx, dy, dz, own_x, own_y, depth, thickness):
     # The pixel that a ray starts from is not compared with itself.
     if surface <= F0 or ray > surface or (i == own_x and j == own_y):
         return IN_FRONT, i, j
-    if ray >= slab_bottom(surface, thickness):
+    if ray >= slab_bottom(surface, slab_a, slab_b):
         return INSIDE, i, j
     return BEHIND, i, j
 
 
 class LinearNumbers(NamedTuple):
-    """Parameters of `hybrid_rt.Linear`; `thickness` in units of the near plane's distance."""
+    """Parameters of `hybrid_rt.Linear`; `slab_a`, `slab_b`: see `screen.slab_bottom`.
 
-    thickness: float
+    stride: in units of w where a ray starts.
+    """
+
+    slab_a: float
+    slab_b: float
     stride: float
     refinements: int
     max_steps: int
@@ -59,9 +64,10 @@ def linear_ray(numbers, buffers, pyramid, ray, own_x, own_y, steps_by_level):
     x, y, z0 = np.float32(ray.x), np.float32(ray.y), np.float32(ray.depth)
     # The deltas of a direction of unit length.
     dx, dy = np.float32(ray.dx / ray.length), np.float32(ray.dy / ray.length)
-    dz, cosine = np.float32(ray.dz / ray.length), np.float32(ray.gz / ray.length)
+    dz, cosine = np.float32(ray.dz / ray.length), np.float32(ray.gw / ray.length)
     s_end = np.float32(ray.s_end * ray.length)
-    thickness, stride = np.float32(numbers.thickness), np.float32(numbers.stride)
+    slab_a, slab_b = np.float32(numbers.slab_a), np.float32(numbers.slab_b)
+    stride = np.float32(numbers.stride)
     status, max_steps, refinements = ray.status, numbers.max_steps, numbers.refinements
     s_free = F0
     passed = False  # behind a surface
@@ -77,7 +83,7 @@ def linear_ray(numbers, buffers, pyramid, ray, own_x, own_y, steps_by_level):
             return status, False, -1, -1, 0.0, s_end / ray.length, step - 1
         if step > max_steps:
             return EXHAUSTED, False, -1, -1, 0.0, s_free / ray.length, max_steps
-        where, i, j = look(s, x, y, z0, dx, dy, dz, own_x, own_y, depth, thickness)
+        where, i, j = look(s, x, y, z0, dx, dy, dz, own_x, own_y, depth, slab_a, slab_b)
         if where == INSIDE:
             break
         if where == BEHIND:
@@ -88,7 +94,7 @@ def linear_ray(numbers, buffers, pyramid, ray, own_x, own_y, steps_by_level):
     for _ in range(refinements):
         middle = HALF * (low + high)
         at = middle / (F1 + middle * cosine)
-        where, mid_i, mid_j = look(at, x, y, z0, dx, dy, dz, own_x, own_y, depth, thickness)
+        where, mid_i, mid_j = look(at, x, y, z0, dx, dy, dz, own_x, own_y, depth, slab_a, slab_b)
         if where == INSIDE:
             high, s, i, j = middle, at, mid_i, mid_j
         else:

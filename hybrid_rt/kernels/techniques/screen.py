@@ -1,11 +1,15 @@
 """A ray on the screen: set-up and stepping from cell to cell, shared by all techniques.
 
-On the screen a ray is ``(x, y, depth)(s) = start + s * delta`` with
-``s = (t - t_near) / z_view(t)``: for q(t) = M (o + t d - eye) and q at t_near = (x z, y z, z),
+A view maps p - eye to (x w, y w, w, d) with depth = d / w, see `kernels.arrays.ViewArrays`. On the
+screen a ray is ``(x, y, depth)(s) = start + s * delta`` with ``s = (t - t_near) / w(t)``: for
+q(t) = M (o + t d - eye, 1) and q at t_near = (x w, y w, w, depth w),
 
-    x(s) = x + s (qd_x - x qd_z),   depth(s) = depth (1 - s qd_z),   t - t_near = s z / (1 - s qd_z)
+    x(s) = x + s (qd_x - x qd_w),   depth(s) = depth + s (qd_d - depth qd_w),
+    t - t_near = s w / (1 - s qd_w).
 
-which needs no end point and stays finite as t goes to infinity (s = 1 / qd_z, depth = 0).
+A pinhole has w = z_view and qd_d = 0: no end point is needed, and all stays finite as t goes to
+infinity (s = 1 / qd_w, depth = 0). Parallel lines of sight have w = 1 and qd_w = 0, so s is
+t - t_near; the far plane, depth = 0, is a border of the view then.
 
 Directions are scaled by a power of two first, so that their length plays no part in float32.
 """
@@ -28,6 +32,9 @@ F0 = np.float32(0.0)
 F1 = np.float32(1.0)
 HALF = np.float32(0.5)
 INF = np.float32(np.inf)
+BEFORE_FAR = 1.0 - 2.0**-16
+"""A ray's end at the far plane comes earlier by this, relative to its length, so that what is added
+to it for rounding does not lead beyond."""
 LARGEST_T = float(np.finfo(np.float32).max)
 """A hit whose t float32 cannot hold is given this one: infinity would say that there is none."""
 
@@ -43,8 +50,8 @@ class ScreenRay(NamedTuple):
     dy: float
     dz: float
     s_end: float
-    z: float
-    gz: float
+    w: float
+    gw: float
     length: float
 
 
@@ -65,15 +72,21 @@ def screen_ray(i, rays, view, width, height):
     scale = scale_of(np.float64(dx), np.float64(dy), np.float64(dz))
     placed = place(
         np.float64(ox), np.float64(oy), np.float64(oz), dx * scale, dy * scale, dz * scale,
-        rays.t_near[i] / scale, rays.t_far[i] / scale, view.m, view.eye, view.near, width, height,
+        rays.t_near[i] / scale, rays.t_far[i] / scale, view.m, view.eye, width, height,
     )  # fmt: skip
     length = math.sqrt((dx * scale) ** 2 + (dy * scale) ** 2 + (dz * scale) ** 2)
     return ScreenRay(*placed, length), scale
 
 
 @inlined
-def place(ox, oy, oz, dx, dy, dz, t_near, t_far, m, eye, near, width, height):
-    """Return (status, x, y, depth, delta x, y, depth, s_end, z, qd_z); paper: "Initialise".
+def mapped(m, k, x, y, z):
+    """Return row k of a map, without its constant, times a vector."""
+    return m[k, 0] * x + m[k, 1] * y + m[k, 2] * z
+
+
+@inlined
+def place(ox, oy, oz, dx, dy, dz, t_near, t_far, m, eye, width, height):
+    """Return (status, x, y, depth, delta x, y, depth, s_end, w, qd_w); paper: "Initialise".
 
     `status` is how the ray ends if it meets nothing before `s_end`, the largest s inside the view
     volume; where the ray cannot even start, s_end is negative and `status` says why.
@@ -85,28 +98,30 @@ def place(ox, oy, oz, dx, dy, dz, t_near, t_far, m, eye, near, width, height):
     px = ox + t_near * dx - eye[0]
     py = oy + t_near * dy - eye[1]
     pz = oz + t_near * dz - eye[2]
-    qx = m[0, 0] * px + m[0, 1] * py + m[0, 2] * pz
-    qy = m[1, 0] * px + m[1, 1] * py + m[1, 2] * pz
-    z = m[2, 0] * px + m[2, 1] * py + m[2, 2] * pz
-    if not z >= near:
+    w, d = mapped(m, 2, px, py, pz) + m[2, 3], mapped(m, 3, px, py, pz) + m[3, 3]
+    if not w >= d:
         return NEAR, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0
-    x, y = qx / z, qy / z
-    if not (0.0 <= x <= width and 0.0 <= y <= height):
+    x = (mapped(m, 0, px, py, pz) + m[0, 3]) / w
+    y = (mapped(m, 1, px, py, pz) + m[1, 3]) / w
+    depth = d / w
+    # Depth is 0 at the far plane.
+    if not (0.0 <= x <= width and 0.0 <= y <= height and depth > 0.0):
         return OFFSCREEN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0
-    gx = m[0, 0] * dx + m[0, 1] * dy + m[0, 2] * dz
-    gy = m[1, 0] * dx + m[1, 1] * dy + m[1, 2] * dz
-    gz = m[2, 0] * dx + m[2, 1] * dy + m[2, 2] * dz
-    depth = near / z
-    delta_x, delta_y, delta_depth = gx - x * gz, gy - y * gz, -depth * gz
+    gx, gy = mapped(m, 0, dx, dy, dz), mapped(m, 1, dx, dy, dz)
+    gw, gd = mapped(m, 2, dx, dy, dz), mapped(m, 3, dx, dy, dz)
+    delta_x, delta_y, delta_depth = gx - x * gw, gy - y * gw, gd - depth * gw
     status = MISS
     s_end = math.inf
-    if gz > 0.0:
-        s_end = 1.0 / gz  # t = infinity
-    elif gz < 0.0:
+    if gw > 0.0:
+        s_end = 1.0 / gw  # t = infinity
+    elif gw < gd:
         status = NEAR
-        s_end = (near - z) / (gz * near)
+        s_end = (d - w) / (d * gw - w * gd)
+    elif gd < 0.0:
+        status = OFFSCREEN
+        s_end = BEFORE_FAR * (depth / -delta_depth)
     if t_far < math.inf:
-        s_far = (t_far - t_near) / (z + (t_far - t_near) * gz)
+        s_far = (t_far - t_near) / (w + (t_far - t_near) * gw)
         if 0.0 <= s_far < s_end:  # negative: t_far lies behind the eye
             status = MISS
             s_end = s_far
@@ -120,16 +135,16 @@ def place(ox, oy, oz, dx, dy, dz, t_near, t_far, m, eye, near, width, height):
         if s_side < s_end:
             status = OFFSCREEN
             s_end = s_side
-    return status, x, y, depth, delta_x, delta_y, delta_depth, s_end, z, gz
+    return status, x, y, depth, delta_x, delta_y, delta_depth, s_end, w, gw
 
 
 @inlined
-def ray_t(s, z, gz, t_near):
+def ray_t(s, w, gw, t_near):
     """Return t of the screen parameter s; infinite where the ray has reached infinity."""
-    denominator = 1.0 - s * gz
+    denominator = 1.0 - s * gw
     if denominator <= 0.0:
         return math.inf
-    return t_near + s * z / denominator
+    return t_near + s * w / denominator
 
 
 @inlined
@@ -179,12 +194,13 @@ def next_cell(
 
 
 @inlined
-def slab_bottom(depth, thickness):
-    """Return the depth at `thickness`, in units of the near plane's distance, behind `depth`.
+def slab_bottom(depth, a, b):
+    """Return the depth at a thickness behind `depth`, along the view: (depth - b) / (1 + a depth).
 
+    a, b: of the thickness, `hybrid_rt.camera.camera.Camera.receding`. For a pinhole that is
     ``near / (z_view + thickness)`` for ``depth = near / z_view``.
     """
-    return depth / (F1 + depth * thickness)
+    return (depth - b) / (F1 + depth * a)
 
 
 @inlined
@@ -202,10 +218,10 @@ def write_row(i, row, ray, scale, rays, prim_ids, out):
     elif how == MISS:
         out.t_free[i] = rays.t_far[i]
     else:
-        out.t_free[i] = ray_t(np.float64(s_free), ray.z, ray.gz, start) * scale
+        out.t_free[i] = ray_t(np.float64(s_free), ray.w, ray.gw, start) * scale
     if hit_x >= 0:
         out.prim_id[i] = prim_ids[hit_y, hit_x]
-        out.t[i] = min(ray_t(np.float64(s_hit), ray.z, ray.gz, start) * scale, LARGEST_T)
+        out.t[i] = min(ray_t(np.float64(s_hit), ray.w, ray.gw, start) * scale, LARGEST_T)
     else:
         out.prim_id[i] = -1
         out.t[i] = np.inf

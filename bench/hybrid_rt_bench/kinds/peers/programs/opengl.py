@@ -23,10 +23,11 @@ VERTEX = """
 #version 450
 in vec3 position;
 uniform vec3 eye, eye_rest, to_x, to_y, to_w;
-uniform float near;
+uniform vec3 to_depth;
+uniform vec4 at_eye;
 void main() {
     vec3 q = (position - eye) - eye_rest;
-    gl_Position = vec4(dot(to_x, q), dot(to_y, q), near, dot(to_w, q));
+    gl_Position = vec4(dot(to_x, q), dot(to_y, q), dot(to_depth, q), dot(to_w, q)) + at_eye;
 }
 """
 FRAGMENT = """
@@ -59,7 +60,7 @@ _FUNCTIONS: dict[str, tuple[Any, ...]] = {
 class Llvmpipe(Opened):
     """Depth and gl_PrimitiveID of a camera, by llvmpipe.
 
-    Depth is ours: ``near / z_view``, in a float32 depth buffer, nearest is largest, nothing is far
+    Depth is ours, see `hybrid_rt.project`, in a float32 depth buffer: nearest is largest, 0 is far
     away. The picture is drawn upside down, so that its first row in memory is the top one.
 
     ``LP_NUM_THREADS`` is set to `threads`. llvmpipe starts so many threads for its tiles of 64x64
@@ -181,14 +182,17 @@ def _uniforms(camera: hrt.Camera) -> dict[str, Any]:
     """
     eye = np.array(camera.eye)
     high = eye.astype(np.float32).astype(np.float64)
-    x, y = (2 * camera.focal_px / size for size in (camera.width, camera.height))
+    m = camera.arrays.m
+    # Clip space from -w to w, y down: twice a place over the size, less 1.
+    x, y = 2.0 * m[0] / camera.width - m[2], 2.0 * m[1] / camera.height - m[2]
     return {
         "eye": tuple(high),
         "eye_rest": tuple(eye - high),
-        "to_x": tuple(x * np.array(camera.right)),
-        "to_y": tuple(-y * np.array(camera.up)),
-        "to_w": camera.forward,
-        "near": camera.near,
+        "to_x": tuple(x[:3]),
+        "to_y": tuple(y[:3]),
+        "to_depth": tuple(m[3, :3]),
+        "to_w": tuple(m[2, :3]),
+        "at_eye": (x[3], y[3], m[3, 3], m[2, 3]),
     }
 
 
