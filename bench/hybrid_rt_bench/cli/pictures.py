@@ -104,18 +104,23 @@ def render(scene: hrt.Scene, camera: hrt.Camera, what: What, threads: int | None
 def depth_picture(gbuffer: hrt.GBuffer) -> tuple[U8, str, Scale | None]:
     """Return distances in colours, a caption where there is none, and their scale.
 
-    Near is bright and far dark, on a logarithmic scale between the 1st and the 99th percentile of
-    the distances in view; white where there is no surface. No scale where nothing is in view.
+    Near is bright and far dark, between the 1st and the 99th percentile of the distances in view,
+    on a logarithmic scale, or a linear one where lines of sight are parallel; white where there is
+    no surface. No scale where nothing is in view.
     """
     covered = gbuffer.prim_id >= 0
     image = np.full((*covered.shape, 3), BACKGROUND, np.uint8)
     if not covered.any():
         return image, "depth: no surface is in view", None
-    z = gbuffer.camera.near / gbuffer.depth[covered]
+    camera = gbuffer.camera
+    z = camera.z_view(gbuffer.depth[covered])
     low, high = (float(end) for end in np.quantile(z, [0.01, 0.99]))
-    if high < 1.001 * low:  # one distance: a scale about it
-        low, high = low / 1.01, high * 1.01
-    scale = Scale("distance along the view axis, z, in the scene's units", low, high, "cividis_r")
+    if high - low <= 1e-3 * abs(high):  # one distance: a scale about it
+        about = 0.01 * abs(high) or 0.01
+        low, high = low - about, high + about
+    label = "distance along the view axis, z, in the scene's units"
+    # Between planes of parallel sight distances may be below zero, and nothing is far off.
+    scale = Scale(label, low, high, "cividis_r", logarithmic=not camera.parallel)
     image[covered] = scale.painted(z)
     return image, "", scale
 

@@ -28,13 +28,7 @@ def normals(gbuffer: hrt.GBuffer) -> F32:
     -------
     (H, W, 3) float32, world
     """
-    covered = gbuffer.prim_id >= 0
-    out = np.zeros((*gbuffer.prim_id.shape, 3), np.float32)
-    corners = gbuffer.scene.vertices[gbuffer.scene.faces[gbuffer.prim_id[covered]]]
-    n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    towards = np.asarray(gbuffer.camera.eye, np.float32) - corners[:, 0]
-    out[covered] = _facing(n, towards)
-    return out
+    return np.nan_to_num(gbuffer.normal, nan=0.0).astype(np.float32)
 
 
 def shaded(gbuffer: hrt.GBuffer, rays: hrt.Rays, tracer: hrt.EmbreeTracer, samples: int = 8) -> U8:
@@ -64,7 +58,7 @@ def shaded(gbuffer: hrt.GBuffer, rays: hrt.Rays, tracer: hrt.EmbreeTracer, sampl
             tracer, rays, np.broadcast_to(SUN, n_ray.shape)
         )
         open_sky = _smoothed(_openness(gbuffer, rays, n_ray, tracer, samples), gbuffer, n)[y, x]
-        view = rays.origin - np.asarray(gbuffer.camera.eye, np.float32)
+        view = gbuffer.camera.towards(rays.origin.astype(np.float64)).astype(np.float32)
         head = np.abs(np.einsum("ij,ij->i", n_ray, view)) / np.linalg.norm(view, axis=1)
         hemisphere = 0.75 + 0.25 * n_ray[:, 1]
         ambient = (open_sky * (0.56 * hemisphere + 0.18 * head))[:, None]

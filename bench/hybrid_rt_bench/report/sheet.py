@@ -9,6 +9,7 @@ import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -34,7 +35,7 @@ GAP, PAD = 12, 4
 
 @dataclass(frozen=True)
 class Scale:
-    """What the colours of a picture measure, from `low` to `high` on a logarithmic scale.
+    """What the colours of a picture measure, from `low` to `high`.
 
     Attributes
     ----------
@@ -44,18 +45,22 @@ class Scale:
         Values at the ends; what lies beyond has the colour of the end.
     colours : str
         Name of the colour map, from `low` to `high`.
+    logarithmic : bool
+        Or linear.
     """
 
     label: str
     low: float
     high: float
     colours: str
+    logarithmic: bool = True
 
     def norm(self) -> Normalize:
         """Return the norm of the scale."""
-        return LogNorm(self.low, self.high)
+        kind = LogNorm if self.logarithmic else Normalize
+        return kind(self.low, self.high)
 
-    def painted(self, values: NDArray[np.float32]) -> U8:
+    def painted(self, values: NDArray[Any]) -> U8:
         """Return the colours of values, (..., 3) uint8."""
         painted = mpl.colormaps[self.colours](self.norm()(values), bytes=True)
         return np.asarray(painted[..., :3], np.uint8)
@@ -184,22 +189,26 @@ def _bar(
     bar = figure.colorbar(mappable, cax=ax, orientation="horizontal", extend="both")
     bar.set_label(label, fontsize=points)
     room = 72 * float(place[2]) * figure.get_figwidth() / (3.2 * points)
-    bar.set_ticks(_ticks(scale.low, scale.high, max(2, int(room))))
+    bar.set_ticks(_ticks(scale, max(2, int(room))))
     bar.ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.4g}"))
     bar.ax.xaxis.set_minor_locator(NullLocator())
     bar.ax.tick_params(labelsize=0.9 * points)
     bar.ax.grid(visible=False)
 
 
-def _ticks(low: float, high: float, most: int) -> list[float]:
-    """Return at most so many round numbers between two, if there are two, else the two."""
-    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    some: list[list[float]] = [
-        [step * 10.0**k for k in decades for step in steps] for steps in ((1, 2, 5), (1, 3), (1,))
-    ]
-    if high < 3 * low:  # about linear
-        some = [list(MaxNLocator(n, steps=[1, 2, 5, 10]).tick_values(low, high)) for n in (4, 2)]
-    for ticks in some:
+def _ticks(scale: Scale, most: int) -> list[float]:
+    """Return at most so many round numbers of a scale, if there are two, else its ends."""
+    low, high = scale.low, scale.high
+    if scale.logarithmic and high > 3 * low:
+        decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+        kinds = [
+            [step * 10.0**k for k in decades for step in steps]
+            for steps in ((1, 2, 5), (1, 3), (1,))
+        ]
+    else:
+        places = (MaxNLocator(n, steps=[1, 2, 5, 10]) for n in (4, 2))
+        kinds = [list(locator.tick_values(low, high)) for locator in places]
+    for ticks in kinds:
         inside = [tick for tick in ticks if low <= tick <= high]
         if 2 <= len(inside) <= most:
             return inside

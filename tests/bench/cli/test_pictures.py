@@ -57,7 +57,7 @@ def test_a_depth_is_as_the_scale_beneath_it_says(view):
     gbuffer, _ = view
     image, _, scale = pictures.depth_picture(gbuffer)
     covered = gbuffer.prim_id >= 0
-    z = gbuffer.camera.near / np.where(covered, gbuffer.depth, 1)
+    z = gbuffer.camera.near / np.where(covered, gbuffer.depth.astype(float), 1)
     assert z[covered].min() <= scale.low < scale.high <= z[covered].max()
     for value in (scale.low, np.sqrt(scale.low * scale.high), scale.high):
         y, x = np.unravel_index(np.where(covered, np.abs(z - value), np.inf).argmin(), z.shape)
@@ -81,6 +81,24 @@ def test_a_view_of_one_distance_has_a_scale_about_it():
     image, _, scale = pictures.depth_picture(hrt.rasterize(wall, camera))
     assert scale.low < 4 < scale.high
     check(sheet.sheet([sheet.Picture(image.repeat(8, 0).repeat(8, 1), "", scale)]))
+
+
+def test_distances_of_parallel_sight_may_be_behind_the_eye():
+    stairs = hrt.Scene.from_arrays(
+        [[x, y, z] for z, x0 in ((-3, -2), (3, 0)) for x, y in ((x0, -2), (x0 + 2, -2), (x0, 2))],
+        [[0, 1, 2], [3, 4, 5]],
+    )
+    camera = hrt.Camera.orthographic(
+        (0, 0, 0), (0, 0, -1), view_height=4, near=-5, far=5, width=64, height=64
+    )
+    gbuffer = hrt.rasterize(stairs, camera)
+    image, _, scale = pictures.depth_picture(gbuffer)
+    assert (scale.low, scale.high) == pytest.approx((-3, 3), rel=1e-5)
+    assert not scale.logarithmic
+    near, far = (image[gbuffer.prim_id == k].mean(axis=0) for k in (1, 0))
+    assert near.sum() > far.sum()
+    check(sheet.sheet([sheet.Picture(image.repeat(4, 0).repeat(4, 1), "", scale)]))
+    assert pictures.render(stairs, camera, "all").shape[1] == 2 * 64 + sheet.GAP
 
 
 def test_a_view_of_nothing_has_no_scale():
