@@ -12,7 +12,7 @@ def verdict(run: RunData) -> str:
     """Return which technique answers most rays of each kind, and how often it is wrong."""
     said = []
     for workload, rows in run.results.groupby("workload", sort=False):
-        row = rows.loc[rows.alpha.idxmax()]
+        row = rows.iloc[int(rows.alpha.to_numpy().argmax())]
         kind = str(workload).replace("_", " ")
         words = f"Of {int(row.rays):,} {kind} rays of {run.meta['frame']['file']}"
         if not row.resolved:
