@@ -130,7 +130,7 @@ def test_a_verdict_tells_of_failed_cells_scenes_in_part_and_an_early_end(runs, k
     said = verdict_paragraph(dataclasses.replace(run, meta=meta), kinds[kind].verdict_maker())
     assert f"1 of {len(lost)} cells failed" in said
     assert "did not finish" in said
-    assert said.endswith("hall, half: no roof.")
+    assert said.endswith("Scene hall (half): no roof.")
 
 
 @pytest.mark.parametrize("kind", ["paper", "error", "ablation", "peers", "scaling", "stability"])

@@ -12,7 +12,7 @@ from hybrid_rt_bench.report.table import Table
 from hybrid_rt_bench.results.folder import RunData
 from hybrid_rt_scenes import get_scene, scene_names
 
-NOTE = "hall, half: the roof is absent."
+NOTE = "Scene hall (half): the roof is absent."
 
 
 @pytest.fixture
