@@ -7,9 +7,13 @@ from .base import Tracer as Tracer
 from .base import march as march
 from .base import prepare as prepare
 from .base import register as register
-from .camera.pinhole import Camera as Camera
-from .camera.pinhole import project as project
-from .camera.pinhole import unproject as unproject
+from .camera.camera import Camera as Camera
+from .camera.camera import project as project
+from .camera.camera import unproject as unproject
+from .camera.orthographic import Orthographic as Orthographic
+from .camera.pinhole import Pinhole as Pinhole
+from .camera_files import load_cameras as load_cameras
+from .camera_files import save_cameras as save_cameras
 from .compiling import Compiling as Compiling
 from .compiling import on_compile as on_compile
 from .errors import ArgumentError as ArgumentError

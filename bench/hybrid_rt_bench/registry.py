@@ -60,6 +60,9 @@ class Kind:
         Returns the tables of how two of its runs differ; None for a kind without times.
     listing : callable, optional
         Returns tables for ``hybrid-rt list``.
+    frames : str
+        The experiment that takes the place of its own where ``--depth`` names a frame; empty for a
+        kind that has no such.
     """
 
     name: str
@@ -73,6 +76,7 @@ class Kind:
     options: Sequence[Option] = ()
     compare: Any = None
     listing: Any = None
+    frames: str = ""
 
     def spec_class(self) -> type[AnyExperiment]:
         """Return the class of its experiments."""

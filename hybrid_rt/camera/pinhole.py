@@ -1,168 +1,91 @@
-"""A pinhole camera; world points to the screen and back."""
+"""The pinhole camera: lines of sight meet in the eye."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from hybrid_rt import _check
+from hybrid_rt.camera.camera import Camera
+from hybrid_rt.camera.parts import checked_lens
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels.arrays import F64, ViewArrays
 
-Vector = tuple[float, float, float]
 NARROWEST = 1e-30
 """Degrees; any narrower, and a pixel's place is beyond float64."""
-AXES = ("right", "up", "forward")
-LARGEST_SIDE = 32768
-"""Pixels along a side: what the raster's fixed-point coordinates hold."""
-ORTHONORMAL = 1e-9
-"""By how much products of the axes, which have length 1, may be off."""
 
 
-@dataclass(frozen=True)
-class Camera:
-    """A pinhole camera with square pixels. Make one with `Camera.look_at`.
+@dataclass(frozen=True, repr=False)
+class Pinhole(Camera):
+    """A camera whose lines of sight meet in the eye; ``depth = near / z_view``.
+
+    Made by `Camera.look_at`, `Camera.from_matrices` and `Camera.from_intrinsics`. What all cameras
+    have is said there.
 
     Attributes
     ----------
-    eye : three float, world
-    right, up, forward : three float, world
-        Orthonormal; the camera looks along `forward`, which is -Z of its own right-handed frame.
     vfov_deg : float
-        Vertical field of view in degrees.
-    width, height : int
-        Pixels.
-    near : float
-        Distance of the near plane along `forward`, world units.
+        Vertical field of view in degrees, of a screen around the axis: `shift_px` plays no part.
+    aspect : float
+        Focal length across over focal length down, fx / fy; 1 for square pixels.
+    shift_px : two float
+        The principal point minus the middle of the screen, pixels; x right, y down.
+    far : float
+        Distance of the far plane, world units, as depth buffers of others are scaled by it;
+        infinite by default. What lies beyond it is seen all the same.
     """
 
-    eye: Vector
-    right: Vector
-    up: Vector
-    forward: Vector
     vfov_deg: float
-    width: int
-    height: int
-    near: float
+    aspect: float = 1.0
+    shift_px: tuple[float, float] = (0.0, 0.0)
+    far: float = math.inf
 
-    def __post_init__(self) -> None:
-        checked = {
-            "eye": _check.point3("eye", self.eye),
-            **{name: _check.vector3(name, getattr(self, name)) for name in AXES},
+    def _checked(self) -> dict[str, Any]:
+        near = _check.float32_length("near", self.near)
+        far = self.far
+        if not (isinstance(far, float) and far == math.inf):
+            far = _check.real("far", far)
+            if not far > near:
+                raise ArgumentError("far", f"more than near, {near:g}", _check.describe(self.far))
+        return {
+            "near": near,
             "vfov_deg": _check.real("vfov_deg", self.vfov_deg, above=NARROWEST, below=180.0),
-            "width": _check.integer("width", self.width, least=1, most=LARGEST_SIDE),
-            "height": _check.integer("height", self.height, least=1, most=LARGEST_SIDE),
-            "near": _check.float32_length("near", self.near),
+            **checked_lens(self.aspect, self.shift_px),
+            "far": far,
         }
-        for name, value in checked.items():
-            object.__setattr__(self, name, value)
-        axes = np.array([self.right, self.up, self.forward])
-        for k, name in enumerate(AXES):
-            long = np.abs(axes[k]).max() > 2.0
-            if long or np.abs(axes @ axes[k] - np.eye(3)[k]).max() > ORTHONORMAL:
-                expected = "an axis of length 1 at right angles to the other two"
-                raise ArgumentError(name, expected, _check.describe(getattr(self, name)))
-
-    @classmethod
-    def look_at(
-        cls,
-        eye: Any,
-        target: Any,
-        up: Any = (0.0, 1.0, 0.0),
-        *,
-        vfov_deg: float = 60.0,
-        width: int = 1920,
-        height: int = 1080,
-        near: float = 0.05,
-    ) -> Camera:
-        """Return a camera at `eye` that looks at `target`.
-
-        Parameters
-        ----------
-        eye, target, up : three float, world
-            `up` need not be orthogonal to the view, only not parallel to it.
-        vfov_deg : float
-            Vertical field of view, 0 < vfov_deg < 180.
-        width, height : int
-            Pixels, 1 to 32768 each.
-        near : float
-            Distance of the near plane, > 0, world units.
-
-        Raises
-        ------
-        ArgumentError
-            Anything out of range, `eye` equal to `target`, `up` zero or parallel to the view.
-        """
-        eye3 = np.array(_check.vector3("eye", eye))
-        target3 = np.array(_check.vector3("target", target))
-        up3 = np.array(_check.vector3("up", up))
-        with np.errstate(over="ignore"):
-            forward = target3 - eye3
-        distance = math.hypot(*forward)
-        if distance == 0.0 or not math.isfinite(distance):
-            raise ArgumentError("target", "a point other than eye", _check.describe(target))
-        forward = forward / distance
-        length = math.hypot(*up3)
-        if length == 0.0 or not math.isfinite(length):
-            raise ArgumentError("up", "a direction of finite length > 0", _check.describe(up))
-        right = np.cross(forward, up3 / length)
-        sine = float(np.linalg.norm(right))
-        if sine < 1e-9:  # relative: both vectors have unit length here
-            raise ArgumentError("up", "a direction not parallel to the view", _check.describe(up))
-        right = right / sine
-        return cls(
-            eye=_vec(eye3),
-            right=_vec(right),
-            up=_vec(np.cross(right, forward)),
-            forward=_vec(forward),
-            vfov_deg=vfov_deg,
-            width=width,
-            height=height,
-            near=near,
-        )
 
     def __repr__(self) -> str:
-        eye, forward = (" ".join(f"{x:.4g}" for x in v) for v in (self.eye, self.forward))
-        size = f"{self.width} x {self.height} pixels, {self.vfov_deg:.4g} degrees high"
-        return f"<Camera at ({eye}) along ({forward}): {size}, near {self.near:.4g}>"
-
-    def resized(self, width: int, height: int) -> Camera:
-        """Return the same view with another number of pixels; the vertical field of view stays."""
-        return replace(self, width=width, height=height)
-
-    def widened(self, factor: float) -> Camera:
-        """Return a view `factor` times as wide and as high around the same axis.
-
-        Pixels stay as they are, so their number grows with the square of `factor`: with a factor
-        above 1 the view gets a border, a *guard band*.
-
-        Parameters
-        ----------
-        factor : float
-            > 0; the numbers of pixels are rounded.
-
-        Raises
-        ------
-        ArgumentError
-            `factor` out of range, or more pixels than a camera may have.
-        """
-        factor = _check.real("factor", factor, above=0.0)
-        height = max(1, round(self.height * factor))
-        wider = self.resized(max(1, round(self.width * factor)), height)
-        return replace(wider, vfov_deg=math.degrees(2.0 * math.atan(0.5 * height / self.focal_px)))
-
-    @property
-    def arrays(self) -> ViewArrays:
-        """The projection, as kernels take it."""
-        return ViewArrays(self.pixel_from_world, np.array(self.eye), self.near)
+        odd = "" if self.aspect == 1.0 else f", fx {self.aspect:.4g} fy"
+        x, y = self.shift_px
+        odd += "" if x == y == 0.0 else f", centre shifted by ({x:.4g}, {y:.4g}) pixels"
+        return f"<Camera {self._words(f'{self.vfov_deg:.4g} degrees high{odd}')}>"
 
     @property
     def focal_px(self) -> float:
-        """Distance of the image plane in pixels."""
+        """Distance of the image plane in pixels as high as these, fy."""
         return 0.5 * self.height / math.tan(math.radians(self.vfov_deg) / 2)
+
+    @property
+    def scale_px(self) -> tuple[float, float]:
+        """Focal lengths fx and fy: pixels of a length of 1 at the distance 1."""
+        return self.aspect * self.focal_px, self.focal_px
+
+    @property
+    def _shift(self) -> tuple[float, float]:
+        return self.shift_px
+
+    @property
+    def arrays(self) -> ViewArrays:
+        """The projection and its inverse, as kernels take them."""
+        m, frame = np.zeros((4, 4)), np.zeros((4, 4))
+        m[:3, :3] = self.pixel_from_world
+        m[3, 3] = self.near
+        frame[:3, :3] = self.world_from_pixel
+        frame[3, 3] = 1.0
+        return ViewArrays(m, np.array(self.eye), frame, self.near, self.hand)
 
     @property
     def pixel_from_world(self) -> F64:
@@ -171,76 +94,74 @@ class Camera:
         ``q = M @ (p_w - eye)`` gives ``x_px = q0 / q2``, ``y_px = q1 / q2`` and ``z_view = q2``.
         The eye is subtracted first, in float64, so that a scene far from the origin loses nothing.
         """
-        f = self.focal_px
+        (fx, fy), (cx, cy) = self.scale_px, self.centre_px
         forward = np.array(self.forward)
         return np.stack(
             [
-                f * np.array(self.right) + 0.5 * self.width * forward,
-                -f * np.array(self.up) + 0.5 * self.height * forward,
+                fx * np.array(self.right) + cx * forward,
+                -fy * np.array(self.up) + cy * forward,
                 forward,
             ]
         )
 
     @property
     def world_from_pixel(self) -> F64:
-        """(3, 3) float64; rows right / f, -up / f and forward, with f = `focal_px`.
+        """(3, 3) float64; rows right / fx, -up / fy and the view through the screen's middle.
 
-        The ray ``forward + (x - W / 2) row0 + (y - H / 2) row1`` runs from the eye through the
-        place (x, y) of the screen and has z_view = 1 at its end.
+        The ray ``row2 + (x - W / 2) row0 + (y - H / 2) row1`` runs from the eye through the place
+        (x, y) of the screen and has z_view = 1 at its end.
         """
-        f = self.focal_px
-        return np.stack([np.array(self.right) / f, -np.array(self.up) / f, np.array(self.forward)])
+        (fx, fy), (x, y) = self.scale_px, self.shift_px
+        across, down = np.array(self.right) / fx, -np.array(self.up) / fy
+        return np.stack([across, down, np.array(self.forward) - x * across - y * down])
 
+    @property
+    def parallel(self) -> bool:
+        """They are not."""
+        return False
 
-def _vec(v: F64) -> Vector:
-    return float(v[0]), float(v[1]), float(v[2])
+    def z_view(self, depth: Any) -> F64:
+        """Return distances from the eye along `forward`, float64, of depths, array_like."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(self.near / np.asarray(depth, np.float64))
 
+    def depth_at(self, z_view: Any) -> F64:
+        """Return depths, float64, of distances from the eye along `forward`, array_like."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(self.near / np.asarray(z_view, np.float64))
 
-def project(camera: Camera, points_w: Any) -> F64:
-    """Return where world points fall on the screen.
-
-    Parameters
-    ----------
-    camera : Camera
-    points_w : (N, 3) array_like of float, world
-
-    Returns
-    -------
-    (N, 3) float64, screen
-        x and y in pixels, and ``depth = near / z_view``. A point behind the eye has a negative
-        depth, a point in the eye's plane is not finite.
-    """
-    _check.instance("camera", camera, Camera)
-    p = _check.array("points_w", points_w, ("N", 3), np.float64)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        q = (p - np.array(camera.eye)) @ camera.pixel_from_world.T
-        return np.asarray(
-            np.stack([q[:, 0] / q[:, 2], q[:, 1] / q[:, 2], camera.near / q[:, 2]], axis=1)
+    def views(self, x: Any, y: Any) -> tuple[F64, F64]:
+        """Return the lines of sight through places of the screen; see `Camera.views`."""
+        x_v, y_v = self._across(x, y)
+        direction = np.asarray(
+            np.array(self.forward) + x_v * np.array(self.right) + y_v * np.array(self.up)
         )
+        return np.broadcast_to(np.array(self.eye), direction.shape), direction
 
+    def primary(self, x: Any, y: Any) -> tuple[F64, F64, float, float]:
+        """Return rays through places of the screen, from the eye: t is z_view."""
+        return *self.views(x, y), self.near, math.inf
 
-def unproject(camera: Camera, points_px: Any) -> F64:
-    """Return the world points of screen points; the inverse of `project`.
+    def towards(self, points_w: F64) -> F64:
+        """Return the directions, (N, 3) float64, in which points (N, 3) are seen."""
+        return np.asarray(points_w - np.array(self.eye))
 
-    Parameters
-    ----------
-    camera : Camera
-    points_px : (N, 3) array_like of float, screen
-        x and y in pixels, and depth. A depth of 0 is infinitely far and not finite.
+    def receding(self, length: float) -> tuple[float, float]:
+        """Return what `Camera.receding` says: near / (z_view + length) of depths near / z_view."""
+        return length / self.near, 0.0
 
-    Returns
-    -------
-    (N, 3) float64, world
-    """
-    _check.instance("camera", camera, Camera)
-    s = _check.array("points_px", points_px, ("N", 3), np.float64)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        z = camera.near / s[:, 2]
-        x_v = (s[:, 0] - 0.5 * camera.width) / camera.focal_px
-        y_v = (0.5 * camera.height - s[:, 1]) / camera.focal_px
-        ray = (
-            np.array(camera.forward)
-            + x_v[:, None] * np.array(camera.right)
-            + y_v[:, None] * np.array(camera.up)
-        )
-        return np.asarray(np.array(camera.eye) + z[:, None] * ray)
+    @property
+    def stride_unit(self) -> float:
+        """A stride is a share of z_view where the ray starts."""
+        return 1.0
+
+    def resized(self, width: int, height: int) -> Self:
+        """Return the same view with another number of pixels; the vertical field of view stays."""
+        x, y = self.shift_px
+        finer = _check.integer("height", height, least=1) / self.height
+        shift = (x * finer, y * finer)
+        return replace(self, width=width, height=height, shift_px=shift)
+
+    def _taller(self, width: int, height: int) -> Self:
+        vfov = math.degrees(2.0 * math.atan(0.5 * height / self.focal_px))
+        return replace(self, width=width, height=height, vfov_deg=vfov)

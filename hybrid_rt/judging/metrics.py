@@ -47,7 +47,7 @@ from typing import Any
 import numpy as np
 
 from hybrid_rt import _check
-from hybrid_rt.camera.pinhole import Camera, project
+from hybrid_rt.camera.camera import Camera, project
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.judging.rate import Rate
 from hybrid_rt.judging.truth import MISSED, Truth

@@ -61,11 +61,40 @@ class MarchedArrays(NamedTuple):
 
 
 class ViewArrays(NamedTuple):
-    """A pinhole: pixel_from_world (3, 3) and eye (3,) float64, near plane's distance float64."""
+    """A view as a homogeneous map of ``p - eye``, and what leads back.
+
+    ``m @ (p - eye, 1) = (x w, y w, w, d)``: x and y in pixels, ``depth = d / w``, the near plane at
+    w = d and what is ahead of it at w > d. m (4, 4), eye (3,) float64. A pinhole has w = z_view and
+    d = near, parallel lines of sight have w = 1.
+
+    frame (4, 4) float64, with rows X, Y, W, D: the point x, y pixels from the screen's middle, at a
+    depth, is ``sigma (x X + y Y + W) + depth D``, homogeneous and relative to the eye. sigma is
+    near for a pinhole and 1 for parallel lines of sight.
+
+    hand: 1.0, or -1.0 where the picture is the mirror image.
+    """
 
     m: F64
     eye: F64
+    frame: F64
+    sigma: float
+    hand: float
+
+
+class SightArrays(NamedTuple):
+    """Lines of sight: axes (3,) float64, the axis' place and 1 / scale in pixels, near and far."""
+
+    eye: F64
+    right: F64
+    up: F64
+    forward: F64
+    cx: float
+    cy: float
+    inv_x: float
+    inv_y: float
+    parallel: bool
     near: float
+    far: float
 
 
 class GBufferArrays(NamedTuple):
@@ -95,11 +124,15 @@ class ListArrays(NamedTuple):
 
 
 class Box(NamedTuple):
-    """A view as a proof needs it: the pinhole, a bound of its rows' sizes, the scene's bounds."""
+    """A view as a proof needs it; `spread`, `deep`, `apart`: see `certified.scalar.trusted`.
+
+    m, eye: as in `ViewArrays`; low, high (3,) float64: the scene's bounds.
+    """
 
     m: F64
     eye: F64
-    near: float
     spread: float
+    deep: float
+    apart: float
     low: F64
     high: F64

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hybrid_rt import _threads
-from hybrid_rt.camera.pinhole import Camera
+from hybrid_rt.camera.camera import Camera
 from hybrid_rt.kernels.arrays import F32, I32, ListArrays
 from hybrid_rt.kernels.raster import lists as kernels
 from hybrid_rt.kernels.raster import lists_bins as bin_kernels
@@ -20,9 +20,10 @@ from hybrid_rt.scene.mesh import Scene
 class PrimitiveLists:
     """For each pixel, the primitives that touch its square, as far as the list goes.
 
-    A pixel's square is grown by `margin_px` to each side. Every triangle with a point in front of
-    the near plane that projects into the grown square is in the pixel's list, with a bound that
-    none of these points is nearer than, or `rest` is such a bound.
+    A pixel's square is grown by `margin_px` to each side. Every triangle with a point between the
+    near plane and, of an orthographic camera, the far plane that projects into the grown square is
+    in the pixel's list, with a bound that none of these points is nearer than, or `rest` is such a
+    bound.
 
     Attributes
     ----------
@@ -78,15 +79,14 @@ def primitive_lists(
 
     Arguments as `hybrid_rt.Certified` has checked them.
     """
-    width, height, near = camera.width, camera.height, float(camera.near)
+    width, height = camera.width, camera.height
     margin = MARGIN_ULPS * 2.0**-24 * (max(width, height) + 1)
     prim_id = np.empty((height, width, length), np.int32)
     nearest = np.empty((height, width, length), np.float32)
     rest = np.empty((height, width), np.float32)
     vertices, faces = scene.arrays.vertices, scene.arrays.faces
     planes = np.zeros((len(faces), PLANE_ROW), np.float32)
-    m, eye, _ = camera.arrays
-    frame = camera.world_from_pixel
+    m, eye, frame, sigma, hand = camera.arrays
     tiles_x = -(-width // TILE)
     tiles = tiles_x * -(-height // TILE)
     boxes = np.empty(len(vertices), np.int64)
@@ -97,7 +97,6 @@ def primitive_lists(
             vertices.reshape(-1),
             eye,
             m,
-            near,
             width,
             height,
             margin,
@@ -128,8 +127,8 @@ def primitive_lists(
             bins = np.empty(entries, np.int64)
             bin_kernels.fill_bins(records, n_survivors, tiles_x, chunk, counts, bins)
             kernels.fill_lists(
-                scene.corners.reshape(-1), tile_start, bins, records, eye, m, frame, near, width,
-                height, margin, tiles_x, first == 0, prim_id, nearest, rest,
+                scene.corners.reshape(-1), tile_start, bins, records, eye, m, frame, sigma,
+                hand, width, height, margin, tiles_x, first == 0, prim_id, nearest, rest,
                 planes.reshape(-1),
             )  # fmt: skip
             first = last

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybrid_rt import _check, _threads
 from hybrid_rt._record import Record
-from hybrid_rt.camera.pinhole import LARGEST_SIDE
+from hybrid_rt.camera.camera import LARGEST_SIDE
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels.arrays import F32, I64, PyramidArrays
 from hybrid_rt.kernels.raster import pyramid as kernels

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from hybrid_rt import _check, _threads
-from hybrid_rt.camera.pinhole import Camera
+from hybrid_rt.camera.camera import Camera
 from hybrid_rt.kernels.arrays import I32, GBufferArrays
 from hybrid_rt.kernels.raster import tiles as kernels
 from hybrid_rt.kernels.raster.bins import TILE, prefix_sums
@@ -119,11 +119,10 @@ def _draw(scene: Scene, camera: Camera, images: GBufferArrays) -> dict[str, floa
         last_time = now
 
     vertices, faces = scene.arrays.vertices, scene.arrays.faces
-    width, height, near = camera.width, camera.height, float(camera.near)
-    m, eye, _ = camera.arrays
-    frame = camera.world_from_pixel
+    width, height = camera.width, camera.height
+    m, eye, frame, sigma, _ = camera.arrays
     xy = np.empty(len(vertices), np.int64)
-    transform_vertices(vertices, eye, m, width, height, near, xy)
+    transform_vertices(vertices, eye, m, width, height, xy)
     done("vertices")
 
     tiles_x = -(-width // TILE)
@@ -139,7 +138,7 @@ def _draw(scene: Scene, camera: Camera, images: GBufferArrays) -> dict[str, floa
         n_records = np.empty(chunks, np.int32)
         counts = np.empty((chunks, tiles), np.int32)
         cull_and_count(
-            vertices, faces, first, last, eye, m, width, height, near, xy, tiles_x,
+            vertices, faces, first, last, eye, m, width, height, xy, tiles_x,
             chunk, survivors, n_survivors, n_records, counts,
         )  # fmt: skip
         entries = int(counts.sum(dtype=np.int64))
@@ -153,7 +152,7 @@ def _draw(scene: Scene, camera: Camera, images: GBufferArrays) -> dict[str, floa
         records = _in_lines(2 * ROW * int(record_start[-1])).view(np.int64)
         bins = np.empty(entries, np.int64)
         fill_bins(
-            vertices, faces, eye, m, frame, width, height, near, xy, tiles_x,
+            vertices, faces, eye, m, frame, sigma, width, height, xy, tiles_x,
             survivors, n_survivors, record_start, counts, records, bins,
         )  # fmt: skip
         done("records")

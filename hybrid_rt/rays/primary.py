@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from hybrid_rt import _check
-from hybrid_rt.camera.pinhole import Camera
+from hybrid_rt.camera.camera import Camera
 from hybrid_rt.kernels.arrays import I32
 from hybrid_rt.rays.rays import Rays
 
@@ -31,9 +31,10 @@ def primary_rays(camera: Camera, *, order: Literal["rows", "tiles"] = "rows") ->
     Returns
     -------
     Rays
-        ``H * W`` rays from the eye. Directions have a component of 1 along the view, so that t is
-        z_view; `t_near` is the camera's near plane, `t_far` infinite. They start on no visible
-        surface: `pixel` is (-1, -1).
+        ``H * W`` rays; directions have a component of 1 along the view. Those of a pinhole camera
+        start in the eye, so that t is z_view; `t_near` is the camera's near plane, `t_far`
+        infinite. Those of an orthographic camera start on its near plane and end on its far plane,
+        so that t is z_view - near. They start on no visible surface: `pixel` is (-1, -1).
 
     Raises
     ------
@@ -44,19 +45,11 @@ def primary_rays(camera: Camera, *, order: Literal["rows", "tiles"] = "rows") ->
     _check.choice("order", order, ("rows", "tiles"))
     in_order = _tile_order if order == "tiles" else _row_order
     pixel = in_order(camera.width, camera.height)
-    x = (pixel[:, 0] + 0.5 - 0.5 * camera.width) / camera.focal_px
-    y = (0.5 * camera.height - pixel[:, 1] - 0.5) / camera.focal_px
     with np.errstate(over="ignore"):  # a view of nearly 180 degrees: infinite, hence invalid rays
-        direction = np.asarray(
-            np.array(camera.forward)
-            + x[:, None] * np.array(camera.right)
-            + y[:, None] * np.array(camera.up),
-            np.float32,
-        )
-    origin = np.empty_like(direction)
-    origin[:] = camera.eye
-    t_near = np.full(len(pixel), camera.near, np.float32)
-    return Rays.from_arrays(origin, direction, None, t_near)
+        origin, direction, start, end = camera.primary(pixel[:, 0] + 0.5, pixel[:, 1] + 0.5)
+        origin, direction = origin.astype(np.float32), direction.astype(np.float32)
+    t_near, t_far = (np.full(len(pixel), t, np.float32) for t in (start, end))
+    return Rays.from_arrays(origin, direction, None, t_near, t_far)
 
 
 def _row_order(width: int, height: int) -> I32:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hybrid_rt import _check
 from hybrid_rt._record import Record
-from hybrid_rt.camera.pinhole import Camera
+from hybrid_rt.camera.camera import Camera
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels.arrays import F32, I32, RayArrays
 from hybrid_rt.scene.mesh import Scene

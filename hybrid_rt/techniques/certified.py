@@ -10,7 +10,7 @@ import numpy as np
 
 from hybrid_rt import _check, _threads
 from hybrid_rt.base import Point, Screen, Technique, register
-from hybrid_rt.camera.pinhole import LARGEST_SIDE, Camera
+from hybrid_rt.camera.camera import LARGEST_SIDE, Camera
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels.arrays import Box
 from hybrid_rt.kernels.techniques.certified import lanes, scalar, slots
@@ -159,7 +159,7 @@ class Certified(Technique):
 
     def _read(self, gbuffer: GBuffer, threads: int | None) -> CertifiedData:
         camera = self.lists_camera(gbuffer.camera)
-        lists = primitive_lists(gbuffer.scene, camera, int(self.lists), threads)
+        lists = primitive_lists(gbuffer.known_scene, camera, int(self.lists), threads)
         if not self.planes:
             # Every comparison denies NaN, so that no plane ever puts a primitive out of question.
             lists.planes.fill(np.nan)
@@ -280,10 +280,12 @@ def _one_by_one(
 
 
 def _box(scene: Scene, camera: Camera) -> Box:
-    """Return a view as a proof needs it; `spread`: see `scalar.trusted`."""
-    m, eye, near = camera.arrays
-    rows = np.abs(m).sum(axis=1)
+    """Return a view as a proof needs it; `spread`, `deep`, `apart`: see `scalar.trusted`."""
+    view = camera.arrays
+    rows, constants = np.abs(view.m[:, :3]).sum(axis=1), np.abs(view.m[:, 3])
     longer = max(camera.width, camera.height) + 1
     low, high = scene.bounds.copy()
     spread = float(max(rows[0], rows[1]) / longer + rows[2])
-    return Box(m, eye, near, spread, low, high)
+    # A constant that is all of its row has no error.
+    apart = max(float(c / r) if r > 0.0 else 0.0 for r, c in zip(rows, constants, strict=True))
+    return Box(view.m, view.eye, spread, float(rows[3]), apart, low, high)

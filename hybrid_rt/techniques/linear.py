@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hybrid_rt import _check
-from hybrid_rt.base import Point, Screen, Technique, register
+from hybrid_rt.base import Point, Screen, register
 from hybrid_rt.kernels.techniques.linear import LinearNumbers
-from hybrid_rt.rays.marched import Marched
-from hybrid_rt.rays.rays import Rays
 from hybrid_rt.techniques import stepping
 from hybrid_rt.techniques.stepping import DEFAULT_THICKNESS, THICKNESSES, Share
 
 
 @register
 @dataclass(frozen=True)
-class Linear(Technique):
+class Linear(stepping.Stepping):
     """March in steps of one length in the world, "linear": the first screen-space reflections.
 
     At each step the ray's point is projected and its pixel read. A point behind the pixel's
@@ -30,7 +28,8 @@ class Linear(Technique):
     stride : float
         Length of a step as a fraction of z_view where the ray starts, > 0. A step parallel to the
         image is then ``stride * focal_px`` pixels long, 1.7 % of the image's height for 0.02 at a
-        field of view of 60 degrees, whatever the scene's unit and the start's distance.
+        field of view of 60 degrees, whatever the scene's unit and the start's distance. Of an
+        orthographic camera, as a fraction of what the image's height shows.
     refinements : int
         Halvings, 0 to 32.
     max_steps : int
@@ -79,12 +78,14 @@ class Linear(Technique):
         ]
         return [*points, Point(f"thickness {usual.thickness}, unrefined", cls(refinements=0))]
 
-    def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
-        thickness = stepping.length_in(screen.scene, self.thickness) / screen.camera.near
-        numbers = LinearNumbers(
-            thickness, float(self.stride), int(self.refinements), int(self.max_steps)
+    def _numbers(self, screen: Screen) -> LinearNumbers:
+        camera = screen.camera
+        return LinearNumbers(
+            *camera.receding(stepping.length_in(screen, self.thickness)),
+            float(self.stride) * camera.stride_unit,
+            int(self.refinements),
+            int(self.max_steps),
         )
-        return stepping.march(rays, screen, None, numbers, threads)
 
 
 def _label(linear: Linear) -> str:

@@ -4,7 +4,7 @@ from hybrid_rt_bench.options import TECHNIQUES, VIEWS
 from hybrid_rt_bench.registry import Kind
 
 
-def judging(name: str, package: str, spec: str) -> Kind:
+def judging(name: str, package: str, spec: str, frames: str = "") -> Kind:
     """Return a kind that judges: its own are its TOML files, class, tables and verdict."""
     return Kind(
         name,
@@ -16,4 +16,5 @@ def judging(name: str, package: str, spec: str) -> Kind:
         verdict=".verdict:verdict",
         figures=("hybrid_rt_bench.judged.figures:plots", "hybrid_rt_bench.judged.maps:figures"),
         options=(*VIEWS, TECHNIQUES),
+        frames=frames,
     )

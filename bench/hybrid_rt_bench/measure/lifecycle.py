@@ -187,15 +187,16 @@ class Request:
         Directory of the run's folder.
     command : sequence of str
         The command line, to be kept.
-    picks : mapping of str to sequence of str
-        What stands in place of the experiment's, by option: "scenes", "cameras", "cases".
+    picks : mapping of str to value
+        What stands in place of the experiment's, by option: names for "scenes", "cameras", "cases",
+        the path of "depth".
     """
 
     reporter: Reporter
     threads: int | None = None
     out: Path = Path("reports")
     command: Sequence[str] = ()
-    picks: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    picks: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def workers(self) -> int:

@@ -9,7 +9,7 @@
       results.parquet   one row a cell and technique: medians, intervals, alpha, errors (also .csv)
       verdicts.parquet  counts of rays by status and verdict, where the kind has them
       pictures/*.npz    the pixels of the figures
-      tables.md, figures/*.png   rendered from the files above, at any time
+      tables.md, figures/*.png and *.svg   rendered from the files above, at any time
 
 Everything is rewritten after every cell, all files together: they change places once all of them
 are on the disk. A cell counts once it is listed in ``run.json``, and rows of a cell that is not are

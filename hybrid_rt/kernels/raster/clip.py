@@ -1,7 +1,8 @@
 """From world vertices to fixed-point screen coordinates, and the clipping that keeps them finite.
 
-A vertex is ``q = M (p - eye)`` in float64: x_px = q0 / q2, y_px = q1 / q2, z_view = q2. Screen
-coordinates are snapped to 1/256 pixel. The guard band bounds them, so that every edge function of
+A vertex is ``q = M (p - eye, 1)`` in float64, (x w, y w, w, d), as `kernels.arrays.ViewArrays` has
+it: x_px = q0 / q2, y_px = q1 / q2 and, in front of the near plane, q2 >= q3. Screen coordinates are
+snapped to 1/256 pixel. The guard band bounds them, so that every edge function of
 `kernels.raster.bins` fits its integers; it is wide enough that clipping against it is rare.
 """
 
@@ -33,12 +34,13 @@ MAX_CORNERS = 8
 
 @inlined
 def project(p0, p1, p2, eye, m):
-    """Return q = M (p - eye) of a world point in float64, or of a vector of points."""
+    """Return q = M (p - eye, 1) of a world point in float64, or of a vector of points."""
     r0, r1, r2 = p0 - eye[0], p1 - eye[1], p2 - eye[2]
     return (
-        m[0, 0] * r0 + m[0, 1] * r1 + m[0, 2] * r2,
-        m[1, 0] * r0 + m[1, 1] * r1 + m[1, 2] * r2,
-        m[2, 0] * r0 + m[2, 1] * r1 + m[2, 2] * r2,
+        m[0, 0] * r0 + m[0, 1] * r1 + m[0, 2] * r2 + m[0, 3],
+        m[1, 0] * r0 + m[1, 1] * r1 + m[1, 2] * r2 + m[1, 3],
+        m[2, 0] * r0 + m[2, 1] * r1 + m[2, 2] * r2 + m[2, 3],
+        m[3, 0] * r0 + m[3, 1] * r1 + m[3, 2] * r2 + m[3, 3],
     )
 
 
@@ -49,7 +51,7 @@ def snap(x):
 
 
 @parallel_kernel
-def transform_vertices(share, vertices, eye, m, width, height, near, xy):
+def transform_vertices(share, vertices, eye, m, width, height, xy):
     """Snap all vertices: (V, 3) float32 world -> xy (V,) int64, y above x.
 
     A vertex nearer than the near plane or beyond the guard band has `CLIPPED` for x and, for y,
@@ -61,9 +63,9 @@ def transform_vertices(share, vertices, eye, m, width, height, near, xy):
         at = group * LANES
         live = simd.first(n - at, LANES)
         px, py, pz = simd.load_triples(vertices, 3 * at, n - at, LANES)
-        q0, q1, q2 = project(simd.to_f64(px), simd.to_f64(py), simd.to_f64(pz), eye, m)
+        q0, q1, q2, q3 = project(simd.to_f64(px), simd.to_f64(py), simd.to_f64(pz), eye, m)
         # Written so that a NaN, which finite input cannot make, would be clipped away.
-        front = q2 >= near
+        front = q2 >= q3
         x, y = q0 / q2, q1 / q2
         plain = front & (x >= GUARD_LOW) & (x <= GUARD_HIGH) & (y >= GUARD_LOW) & (y <= GUARD_HIGH)
         # Tests in homogeneous form hold on both sides of the eye's plane.
@@ -77,10 +79,10 @@ def transform_vertices(share, vertices, eye, m, width, height, near, xy):
 
 
 @inlined
-def _distance(plane, q0, q1, q2, near):
+def _distance(plane, q0, q1, q2, q3):
     """Return the signed distance of q, up to scale, inside the clip plane number `plane`."""
     if plane == 0:
-        return q2 - near
+        return q2 - q3
     if plane == 1:
         return q0 - GUARD_LOW * q2
     if plane == 2:
@@ -97,11 +99,13 @@ def _before(q, a, b):
         return q[a, 0] < q[b, 0]
     if q[a, 1] != q[b, 1]:
         return q[a, 1] < q[b, 1]
-    return q[a, 2] < q[b, 2]
+    if q[a, 2] != q[b, 2]:
+        return q[a, 2] < q[b, 2]
+    return q[a, 3] < q[b, 3]
 
 
 @called
-def clip_plane(plane, near, q, n, result):
+def clip_plane(plane, q, n, result):
     """Clip the convex polygon q[:n] against one plane into `result`; return its corner count.
 
     A cut edge is interpolated from its lexicographically first end whichever way it is walked, so
@@ -110,12 +114,13 @@ def clip_plane(plane, near, q, n, result):
     count = 0
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
-        di = _distance(plane, q[i, 0], q[i, 1], q[i, 2], near)
-        dj = _distance(plane, q[j, 0], q[j, 1], q[j, 2], near)
+        di = _distance(plane, q[i, 0], q[i, 1], q[i, 2], q[i, 3])
+        dj = _distance(plane, q[j, 0], q[j, 1], q[j, 2], q[j, 3])
         if di >= 0.0:
             result[count, 0] = q[i, 0]
             result[count, 1] = q[i, 1]
             result[count, 2] = q[i, 2]
+            result[count, 3] = q[i, 3]
             count += 1
         if (di >= 0.0) != (dj >= 0.0):
             if _before(q, i, j):
@@ -125,7 +130,9 @@ def clip_plane(plane, near, q, n, result):
             t = da / (da - db)
             result[count, 0] = q[a, 0] + t * (q[b, 0] - q[a, 0])
             result[count, 1] = q[a, 1] + t * (q[b, 1] - q[a, 1])
-            result[count, 2] = near if plane == 0 else q[a, 2] + t * (q[b, 2] - q[a, 2])
+            result[count, 3] = q[a, 3] + t * (q[b, 3] - q[a, 3])
+            # On the near plane w = d.
+            result[count, 2] = result[count, 3] if plane == 0 else q[a, 2] + t * (q[b, 2] - q[a, 2])
             count += 1
     return count
 
@@ -138,19 +145,21 @@ def _doubled_area(p, a, b, c):
 
 
 @called
-def clip_triangle(vertices, faces, face, eye, m, near, q, spare, corners):
+def clip_triangle(vertices, faces, face, eye, m, q, spare, corners):
     """Clip one triangle; return how many corners its snapped polygon has.
 
-    q, spare (MAX_CORNERS + 1, 3) float64 are scratch; corners (MAX_CORNERS + 1, 2) int32 comes out
+    q, spare (MAX_CORNERS + 1, 4) float64 are scratch; corners (MAX_CORNERS + 1, 2) int32 comes out
     with a first corner from which the polygon can be cut into a fan.
     """
     for k in range(3):
         v = faces[face, k]
         x, y, z = vertices[v, 0], vertices[v, 1], vertices[v, 2]
-        q[k, 0], q[k, 1], q[k, 2] = project(np.float64(x), np.float64(y), np.float64(z), eye, m)
+        q[k, 0], q[k, 1], q[k, 2], q[k, 3] = project(
+            np.float64(x), np.float64(y), np.float64(z), eye, m
+        )
     n = 3
     for plane in range(5):
-        n = clip_plane(plane, near, q, n, spare)
+        n = clip_plane(plane, q, n, spare)
         q, spare = spare, q
         if n < 3:
             return 0

@@ -185,21 +185,21 @@ def new_clip_scratch():
     """Return room for `clipped_pieces`."""
     corners = MAX_CORNERS + 1
     return (
-        np.empty((corners, 3), np.float64),
-        np.empty((corners, 3), np.float64),
+        np.empty((corners, 4), np.float64),
+        np.empty((corners, 4), np.float64),
         np.empty((corners, 2), np.int32),
     )
 
 
 @called
-def clipped_pieces(vertices, faces, face, eye, m, near, width, height, scratch, pieces):
+def clipped_pieces(vertices, faces, face, eye, m, width, height, scratch, pieces):
     """Clip a face and cut it into triangles that may cover a pixel; return how many.
 
     pieces (PIECES, 7) int64 come out: the corners, packed and turning so that the inside is
     positive, and i0, j0, i1, j1 of the pixel box.
     """
     q, spare, corners = scratch
-    n = clip_triangle(vertices, faces, face, eye, m, near, q, spare, corners)
+    n = clip_triangle(vertices, faces, face, eye, m, q, spare, corners)
     total = np.int64(0)
     for k in range(1, n - 1):
         total += doubled_area(corners[0], corners[k], corners[k + 1])
@@ -230,7 +230,7 @@ def clipped_pieces(vertices, faces, face, eye, m, near, width, height, scratch, 
 
 @parallel_kernel
 def cull_and_count(
-    share, vertices, faces, first, last, eye, m, width, height, near, xy, tiles_x,
+    share, vertices, faces, first, last, eye, m, width, height, xy, tiles_x,
     chunk, survivors, n_survivors, n_records, counts,
 ):  # fmt: skip
     """Find the faces first..last-1 that may cover a pixel, and how many records each tile gets.
@@ -284,7 +284,7 @@ def cull_and_count(
                 ) != 0:
                     continue
                 found = clipped_pieces(
-                    vertices, faces, face, eye, m, near, width, height, clip_scratch, pieces
+                    vertices, faces, face, eye, m, width, height, clip_scratch, pieces
                 )
                 for n in range(found):
                     a = pieces[n]

@@ -221,8 +221,8 @@ def write_tile(left, top, right, bottom, keys, words, floats, filled, prim_id, n
 
 @parallel_kernel
 def fill_lists(
-    share, corners, tile_start, bins, records, eye, m, frame, near, width, height, margin, tiles_x,
-    fresh, prim_id, nearest, rest, planes,
+    share, corners, tile_start, bins, records, eye, m, frame, sigma, hand, width, height, margin,
+    tiles_x, fresh, prim_id, nearest, rest, planes,
 ):  # fmt: skip
     """Insert every bin's faces into the lists of its tile.
 
@@ -284,7 +284,7 @@ def fill_lists(
                 for lane in range(count, LANES):
                     chosen[lane], spans[lane] = chosen[0], spans[0]
                 some = set_up(
-                    corners, chosen, spans, left, top, right, bottom, eye, m, frame, near,
+                    corners, chosen, spans, left, top, right, bottom, eye, m, frame, sigma, hand,
                     width, height, margin, cx, cy, rows, planes,
                 )  # fmt: skip
                 some &= (np.int64(1) << count) - 1

@@ -16,13 +16,15 @@ from hybrid_rt.kernels.raster._order import entry
 from hybrid_rt.kernels.raster.bins import TILE_BITS
 
 SLACK = 2.0**-48
-"""Relative error of sums of three products, 32 e; see `kernels.raster.lists_planes`."""
+"""Relative error of sums of three products and a constant, 32 e; see
+`kernels.raster.lists_planes`."""
 NEAR_SLACK = 2.0**-20
 """The near plane is moved to the eye by this, relative: a ray may end a rounding beyond it."""
 
-LEFT, RIGHT, ABOVE, BELOW, BEHIND = 1, 2, 4, 8, 16
-OUTSIDE = LEFT | RIGHT | ABOVE | BELOW | BEHIND
-"""All three vertices on the outer side of one plane: the triangle is not seen."""
+LEFT, RIGHT, ABOVE, BELOW, BEHIND, BEYOND = 1, 2, 4, 8, 16, 64
+OUTSIDE = LEFT | RIGHT | ABOVE | BELOW | BEHIND | BEYOND
+"""All three vertices on the outer side of one plane: the triangle is not seen. Only parallel lines
+of sight have a far plane, to lie beyond."""
 UNSURE = 32
 """Not certainly in front of the near plane; the vertex has no box."""
 
@@ -36,9 +38,15 @@ MOST = 32767
 
 @inlined
 def row(m, k, x, y, z):
-    """Return (q_k, Q_k): row k of M times vectors, and the sum of its terms' sizes."""
-    a, b, c = m[k, 0] * x, m[k, 1] * y, m[k, 2] * z
-    return a + b + c, simd.absolute(a) + simd.absolute(b) + simd.absolute(c)
+    """Return (q_k, Q_k): row k of M times (vectors, 1), and the sum of its terms' sizes."""
+    a, b, c, d = m[k, 0] * x, m[k, 1] * y, m[k, 2] * z, m[k, 3]
+    return a + b + c + d, simd.absolute(a) + simd.absolute(b) + simd.absolute(c) + abs(d)
+
+
+@inlined
+def exact_row(m, k):
+    """Is row k of M a constant, which has no error."""
+    return m[k, 0] == 0.0 and m[k, 1] == 0.0 and m[k, 2] == 0.0
 
 
 @inlined
@@ -54,7 +62,7 @@ def round_up(depth):
 
 
 @parallel_kernel
-def box_vertices(share, vertices, eye, m, near, width, height, margin, boxes, flags, nearest):
+def box_vertices(share, vertices, eye, m, width, height, margin, boxes, flags, nearest):
     """Find the flags and boxes of all vertices, and how near they are.
 
     vertices (3 V,) float32 world -> boxes (V,) int64, which hold i0, j0, i1, j1 as int16, the first
@@ -62,7 +70,8 @@ def box_vertices(share, vertices, eye, m, near, width, height, margin, boxes, fl
     are in front of the near plane and its depth for all others.
     """
     n = len(vertices) // 3
-    close = near * (1.0 - NEAR_SLACK)
+    slack_w = 0.0 if exact_row(m, 2) else SLACK
+    slack_d = 0.0 if exact_row(m, 3) else SLACK
     right, bottom = width - 1.0, height - 1.0
     beyond_x, beyond_y = min(width, MOST) + 0.0, min(height, MOST) + 0.0
     for group in part(share, (n + LANES - 1) // LANES):
@@ -73,15 +82,18 @@ def box_vertices(share, vertices, eye, m, near, width, height, margin, boxes, fl
         q0, s0 = row(m, 0, x, y, z)
         q1, s1 = row(m, 1, x, y, z)
         q2, s2 = row(m, 2, x, y, z)
-        e0, e1, e2 = SLACK * s0, SLACK * s1, SLACK * s2
+        q3, s3 = row(m, 3, x, y, z)
+        e0, e1, e2, e3 = SLACK * s0, SLACK * s1, slack_w * s2, slack_d * s3
+        high = q3 + e3
+        close = high * (1.0 - NEAR_SLACK)
         front = q2 - e2 >= close
         # Wholly beside the grown screen, in homogeneous form.
         bits = simd.to_i32(q0 + e0 + margin * (q2 + e2) < 0.0)
         bits = bits | simd.to_i32(q0 - e0 - (width + margin) * (q2 + e2) > 0.0) << 1
         bits = bits | simd.to_i32(q1 + e1 + margin * (q2 + e2) < 0.0) << 2
         bits = bits | simd.to_i32(q1 - e1 - (height + margin) * (q2 + e2) > 0.0) << 3
-        bits = bits | simd.to_i32(~(q2 + e2 >= close)) << 4
-        bits = bits | simd.to_i32(~front) << 5
+        bits = bits | simd.to_i32(~(q2 + e2 >= (q3 - e3) * (1.0 - NEAR_SLACK))) << 4
+        bits = bits | simd.to_i32(~front) << 5 | simd.to_i32(high < 0.0) << 6
         simd.store_masked(flags, at, bits, live)
         w = simd.select(front, q2, 1.0)
         px, py = q0 / w, q1 / w
@@ -93,7 +105,7 @@ def box_vertices(share, vertices, eye, m, near, width, height, margin, boxes, fl
         box = box | (pixel(px + ex, -1.0, right) & 0xFFFF) << 32
         box = box | pixel(py + ey, -1.0, bottom) << 48
         simd.store_masked(boxes, at, box, live)
-        simd.store_masked(nearest, at, round_up(near / simd.maximum(q2 - e2, close)), live)
+        simd.store_masked(nearest, at, round_up(high / simd.maximum(q2 - e2, close)), live)
 
 
 @inlined

@@ -1,27 +1,33 @@
 """Faces as planes: what of a triangle is compared with the squares of pixels, and its error.
 
-A triangle's points seen from the eye fill a cone. Its faces are the planes through the eye and the
-edges, N = q_i x q_j for vertices q = M (p - eye), so that N . (x, y, 1) has one sign inside; this
-holds for vertices behind the eye as well (Olano and Greer 1997, "Triangle Scan Conversion using 2D
-Homogeneous Coordinates"), and nothing is clipped.
+A triangle's points and their lines of sight fill a cone, or a prism. Its faces are the planes
+through the edges along the lines of sight, N = q_i x q_j for vertices q = (x w, y w, w) of
+M (p - eye, 1), so that N . (x, y, 1) has one sign inside; this holds for vertices behind the eye as
+well (Olano and Greer 1997, "Triangle Scan Conversion using 2D Homogeneous Coordinates"), and
+nothing is clipped. Of parallel lines of sight w is 1, and N is the edge's line on the screen.
 
 Error bounds. e = 2**-53; a hat marks a computed value. Vertices are float32 and p - eye is rounded
-once, so with Q_k = sum over c of abs(M_kc (p - eye)_c)
+once, so with Q_k = sum over c of abs(M_kc (p - eye)_c), and abs(M_k3) for the constant,
 
-    abs(q^_k - q_k) <= 4 e Q_k,
+    abs(q^_k - q_k) <= 5 e Q_k:
 
-and each component of N, a difference of two products of such, errs by no more than
-``11 e (Q_i Q_j' + Q_i' Q_j)``; evaluating the linear form adds 4 e of its terms' sizes. `SLACK` =
-32 e times the sum of those sizes covers both. The depth plane is near (n . r) / (n . a) with
-n = (b - a) x (c - a): the edges are differences of float32, rounded once, so n_k errs by no more
-than 4 e times its two products' sizes, whose sum over k is less than abs(b - a) abs(c - a) in sums
-of absolute coordinates; SLACK times that, times the sizes of r or of a, covers both scalar
-products, their 3 additions included.
+the difference, the product and three additions. A row that has nothing but its constant, as w of
+parallel lines of sight and d of a pinhole, has no error. Each component of N, a difference of two
+products of such, errs by no more than ``13 e (Q_i Q_j' + Q_i' Q_j)``; evaluating the linear form
+adds 4 e of its terms' sizes. `SLACK` = 32 e times the sum of those sizes covers both.
+
+The depth plane is sigma (n . (x X + y Y + W) - k W_w) / (k D_w - n . D) with n = (b - a) x (c - a)
+and k = n . (a - eye), see `kernels.raster.records`: for a pinhole near (n . r) / k, with the view r
+through the place. The edges are differences of float32, rounded once, so n_k errs by no more than
+4 e times its two products' sizes, whose sum over k is less than abs(b - a) abs(c - a) in sums of
+absolute coordinates; SLACK times that, times the sizes of what n is multiplied with (of k: of
+a - eye, times abs(W_w) or abs(D_w), one of which is 0 and the other 1), covers the scalar products,
+their additions and the difference of two of them.
 
 The sums are taken in parts: what an edge or the plane is at the corner of a block of pixels, plus
 what it gains from there to a pixel's centre. The plane is multiplied by the reciprocal of its
 denominator. No term of a sum is rounded more than seven times so; with what its coefficient errs
-by, 11 e for both, that is 18 e, below the 32 e of SLACK.
+by, 13 e for both, that is 20 e, below the 32 e of SLACK.
 """
 
 from __future__ import annotations
@@ -104,6 +110,18 @@ def size(x, y, z):
 
 
 @inlined
+def times(frame, row, x, y, z):
+    """Return the scalar products of vectors with the first three of a row of `frame`."""
+    return x * frame[row, 0] + y * frame[row, 1] + z * frame[row, 2]
+
+
+@inlined
+def size_of(frame, row):
+    """Return the sum of the sizes of the first three of a row of `frame`."""
+    return abs(frame[row, 0]) + abs(frame[row, 1]) + abs(frame[row, 2])
+
+
+@inlined
 def highest(a, b, c, x0, y0, x1, y1):
     """Return the largest of a x + b y + c over x0..x1, y0..y1."""
     return simd.maximum(a * x0, a * x1) + (simd.maximum(b * y0, b * y1) + c)
@@ -111,7 +129,7 @@ def highest(a, b, c, x0, y0, x1, y1):
 
 @inlined
 def edge_plane(p0, p1, p2, s0, s1, s2, q0, q1, q2, r0, r1, r2, side, width, height, half):
-    """Return the plane through the eye and an edge, turned inwards.
+    """Return the plane through an edge along the lines of sight, turned inwards.
 
     To the constant is added what it gains over a square of half side `half`, and its slack.
     """
@@ -154,8 +172,8 @@ def store_planes(a, b, c, reach, lowered, sloped, i0, j0, i1, j1, cx, cy, margin
 
 @inlined
 def set_up(
-    corners, chosen, spans, left, top, right, bottom, eye, m, frame, near, width, height, margin,
-    cx, cy, rows, planes,
+    corners, chosen, spans, left, top, right, bottom, eye, m, frame, sigma, hand, width, height,
+    margin, cx, cy, rows, planes,
 ):  # fmt: skip
     """Fill `rows` with the edges and planes of LANES faces; return which may touch a square, bits.
 
@@ -188,20 +206,20 @@ def set_up(
     vx, vy, vz = xc - xa, yc - ya, zc - za
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     n_slack = SLACK * size(ux, uy, uz) * size(vx, vy, vz)
-    d = nx * ax + ny * ay + nz * az
-    d_slack = n_slack * size(ax, ay, az)
+    k = nx * ax + ny * ay + nz * az
+    k_slack = n_slack * size(ax, ay, az)
+    d = k * frame[3, 3] - times(frame, 3, nx, ny, nz)
+    d_slack = k_slack * abs(frame[3, 3]) + n_slack * size_of(frame, 3)
     sloped = simd.absolute(d) > EDGE_ON * d_slack
     side = simd.select(d > 0.0, simd.f64(1.0, LANES), -1.0)
     scale = 1.0 / simd.select(sloped, side * d - d_slack, 1.0)
-    towards = side * near
-    pa = towards * (nx * frame[0, 0] + ny * frame[0, 1] + nz * frame[0, 2])
-    pb = towards * (nx * frame[1, 0] + ny * frame[1, 1] + nz * frame[1, 2])
-    pc = towards * (nx * frame[2, 0] + ny * frame[2, 1] + nz * frame[2, 2])
-    reach = n_slack * (near * (
-        width * (abs(frame[0, 0]) + abs(frame[0, 1]) + abs(frame[0, 2]))
-        + height * (abs(frame[1, 0]) + abs(frame[1, 1]) + abs(frame[1, 2]))
-        + (abs(frame[2, 0]) + abs(frame[2, 1]) + abs(frame[2, 2]))
-    ))  # fmt: skip
+    towards = side * sigma
+    pa = towards * times(frame, 0, nx, ny, nz)
+    pb = towards * times(frame, 1, nx, ny, nz)
+    pc = towards * (times(frame, 2, nx, ny, nz) - k * frame[2, 3])
+    reach = n_slack * (sigma * (
+        width * size_of(frame, 0) + height * size_of(frame, 1) + size_of(frame, 2)
+    )) + k_slack * (sigma * abs(frame[2, 3]))  # fmt: skip
     spread = (simd.absolute(pa) + simd.absolute(pb)) * half + reach
     pa, pb = pa * scale, pb * scale
     store_planes(
@@ -214,7 +232,8 @@ def set_up(
     pc = simd.select(sloped, (pc + spread) * scale, np.inf)
     limit = simd.select(sloped, CAP + 2.0 * (spread * scale), np.inf)
 
-    side = simd.select(sloped, side, 0.0)
+    # The sense of the outline on the screen: a mirror image turns it.
+    side = simd.select(sloped, side * hand, 0.0)
     ea, eb, ec = edge_plane(
         a0, a1, a2, sa0, sa1, sa2, b0, b1, b2, sb0, sb1, sb2, side, width, height, half
     )

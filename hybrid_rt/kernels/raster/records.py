@@ -56,17 +56,36 @@ def stored(slope):
 
 
 @inlined
-def write_records(record, count, face, v0, v1, v2, p, q, r, vertices, eye, frame, near, records):
+def row_of(m, k, x, y, z):
+    """Return row k of a map, without its constant, times vectors."""
+    return m[k, 0] * x + m[k, 1] * y + m[k, 2] * z
+
+
+@inlined
+def depth_of(w, d):
+    """Return depths d / w of vertices, 1 for those that are not in front of the near plane."""
+    return simd.select(w > d, d / w, 1.0)
+
+
+@inlined
+def write_records(
+    record, count, face, v0, v1, v2, p, q, r, vertices, eye, m, frame, sigma, records
+):  # fmt: skip
     """Write the first `count` lanes to consecutive records; return the bits of the nearest depths.
 
-    With n = (b - a) x (c - a) and d = n . (a - eye), the ray eye + z r through a pixel, whose r has
-    z_view = 1, meets the plane at z = d / (n . r). So depth = near / z = near (n . r) / d, linear
-    in x and y as r is: r = forward + (x - W / 2) right / f - (y - H / 2) up / f. The edges come
-    from the float32 vertices before the eye is subtracted, so they are exact in float64, and the
-    screen's centre as the reference keeps the sum free of large terms that cancel. The rows of
-    `frame` are right / f, -up / f and forward.
+    With n = (b - a) x (c - a) and k = n . (a - eye), the plane holds the homogeneous points P,
+    relative to the eye, with n . P_xyz = k P_w. The point of the screen x, y from its middle, at a
+    depth, is P = sigma (x X + y Y + W) + depth D, with the rows of `frame` (`kernels.arrays`), so
 
-    A plane through the eye covers nothing, and has `NOTHING` for its nearest depth.
+        depth (k D_w - n . D) = sigma (x n . X + y n . Y + n . W - k W_w),
+
+    linear in x and y. Of a pinhole D = (0, 0, 0, 1), and W is the view through the screen's middle:
+    depth = near (n . r) / k for the view r through the pixel. The edges come from the float32
+    vertices before the eye is subtracted, so they are exact in float64, and the screen's middle as
+    the reference keeps the sum free of large terms that cancel.
+
+    A plane that is seen edge-on all over covers nothing, and has `NOTHING` for its nearest depth.
+    So has, as a negative number, what lies beyond the far plane.
     """
     live = simd.first(count, LANES)
     ax, ay, az = place_of(vertices, v0, live)
@@ -78,18 +97,20 @@ def write_records(record, count, face, v0, v1, v2, p, q, r, vertices, eye, frame
     ny = uz * vx - ux * vz
     nz = ux * vy - uy * vx
     ax, ay, az = ax - eye[0], ay - eye[1], az - eye[2]
-    scale = near / (nx * ax + ny * ay + nz * az)
-    ddx = scale * (nx * frame[0, 0] + ny * frame[0, 1] + nz * frame[0, 2])
-    ddy = scale * (nx * frame[1, 0] + ny * frame[1, 1] + nz * frame[1, 2])
-    centre = scale * (nx * frame[2, 0] + ny * frame[2, 1] + nz * frame[2, 2])
+    k = nx * ax + ny * ay + nz * az
+    scale = sigma / (k * frame[3, 3] - row_of(frame, 3, nx, ny, nz))
+    ddx = scale * row_of(frame, 0, nx, ny, nz)
+    ddy = scale * row_of(frame, 1, nx, ny, nz)
+    centre = scale * (row_of(frame, 2, nx, ny, nz) - k * frame[2, 3])
     # False for the NaN and the infinities of a division by zero.
     some = (simd.absolute(centre) < HUGE) & (simd.absolute(ddx) < HUGE)
     some = some & (simd.absolute(ddy) < HUGE)
-    za = frame[2, 0] * ax + frame[2, 1] * ay + frame[2, 2] * az
-    zb = za + (frame[2, 0] * ux + frame[2, 1] * uy + frame[2, 2] * uz)
-    zc = za + (frame[2, 0] * vx + frame[2, 1] * vy + frame[2, 2] * vz)
-    farthest = simd.to_f32(near / simd.maximum(simd.maximum(za, zb), zc))
-    nearest = simd.to_f32(near / simd.maximum(simd.minimum(simd.minimum(za, zb), zc), near))
+    wa, da = row_of(m, 2, ax, ay, az) + m[2, 3], row_of(m, 3, ax, ay, az) + m[3, 3]
+    zb = depth_of(wa + row_of(m, 2, ux, uy, uz), da + row_of(m, 3, ux, uy, uz))
+    zc = depth_of(wa + row_of(m, 2, vx, vy, vz), da + row_of(m, 3, vx, vy, vz))
+    za = depth_of(wa, da)
+    farthest = simd.to_f32(simd.minimum(simd.minimum(za, zb), zc))
+    nearest = simd.to_f32(simd.maximum(simd.maximum(za, zb), zc))
     rows = transposed(
         p, q, r, above(simd.bits_i32(farthest), face), above(stored(ddy), stored(ddx)),
         simd.bits_i64(centre), simd.bits_i64(ddx), simd.bits_i64(ddy),
@@ -103,7 +124,7 @@ def write_records(record, count, face, v0, v1, v2, p, q, r, vertices, eye, frame
 
 @parallel_kernel
 def fill_bins(
-    share, vertices, faces, eye, m, frame, width, height, near, xy, tiles_x,
+    share, vertices, faces, eye, m, frame, sigma, width, height, xy, tiles_x,
     survivors, n_survivors, record_start, cursors, records, bins,
 ):  # fmt: skip
     """Write the records and the bins that `cull.cull_and_count` has counted.
@@ -130,7 +151,7 @@ def fill_bins(
                 box = box_of(p, q, r, width, height)
                 p, q, r, _ = turned(p, q, r)
                 nearest = write_records(
-                    record, count, face, v0, v1, v2, p, q, r, vertices, eye, frame, near,
+                    record, count, face, v0, v1, v2, p, q, r, vertices, eye, m, frame, sigma,
                     records,
                 )  # fmt: skip
                 numbers = simd.to_i64(simd.iota(LANES)) + record
@@ -142,7 +163,7 @@ def fill_bins(
             face = ~kept[s]
             s += 1
             found = clipped_pieces(
-                vertices, faces, face, eye, m, near, width, height, clip_scratch, pieces
+                vertices, faces, face, eye, m, width, height, clip_scratch, pieces
             )
             for n in range(found):
                 a = pieces[n]
@@ -150,7 +171,7 @@ def fill_bins(
                     record, 1, simd.i32(face, LANES), simd.i32(faces[face, 0], LANES),
                     simd.i32(faces[face, 1], LANES), simd.i32(faces[face, 2], LANES),
                     simd.i64(a[0], LANES), simd.i64(a[1], LANES), simd.i64(a[2], LANES),
-                    vertices, eye, frame, near, records,
+                    vertices, eye, m, frame, sigma, records,
                 )  # fmt: skip
                 put_in_tiles(
                     a[0], a[1], a[2], (a[3], a[4], a[5], a[6]), tiles_x,

@@ -101,16 +101,17 @@ def normal_towards(a, b, c, d):
 
 
 @inlined
-def surface_point(a, n, d, eye, z):
-    """Return the float32 point off the plane (a, n) where the view d from the eye meets it.
+def surface_point(a, n, d, eye, z, unit):
+    """Return the float32 point off the plane (a, n) where the view d from `eye` meets it.
 
-    z is the stored z_view. Where the raster clamped the depth of a sliver seen edge-on, the plane
-    is far off and the stored depth is the surface.
+    z is the stored z_view, and `unit` what one more of the stored depth, relative, takes from it.
+    Where the raster clamped the depth of a sliver seen edge-on, the plane is far off and the stored
+    depth is the surface.
     """
     cos_view = dot(n, d)
     if cos_view != 0.0:
         z_plane = dot(n, minus(a, eye)) / cos_view
-        if abs(z_plane - z) <= 8.0 * ULP * z:
+        if abs(z_plane - z) <= 8.0 * ULP * unit:
             z = z_plane
     p = eye[0] + z * d[0], eye[1] + z * d[1], eye[2] + z * d[2]
     # OffsetRayOrigin (Pharr, Jakob and Humphreys, 6.8.6): along the normal by the error bound of
@@ -183,15 +184,42 @@ def aim(kind, x, y, d, n, o, alpha, reach, light, seed):
     return towards_light(o, light, u1, u2)
 
 
+@inlined
+def along_axes(origin, right, up, x, y):
+    """Return a point or direction moved by x to the right and by y upwards."""
+    return (
+        origin[0] + x * right[0] + y * up[0],
+        origin[1] + x * right[1] + y * up[1],
+        origin[2] + x * right[2] + y * up[2],
+    )
+
+
+@inlined
+def sight_of(x, y, depth, sight):
+    """Return (origin, direction, z, unit): the line of sight of a pixel, and where its surface is.
+
+    The surface is at origin + z direction, and `unit` is by how much z falls as depth grows,
+    relative to depth: see `surface_point`.
+    """
+    x_v = (x + 0.5 - sight.cx) * sight.inv_x
+    y_v = (sight.cy - y - 0.5) * sight.inv_y
+    eye, forward = sight.eye, sight.forward
+    if sight.parallel:
+        unit = (sight.far - sight.near) * depth
+        origin = along_axes(eye, sight.right, sight.up, x_v, y_v)
+        return origin, (forward[0], forward[1], forward[2]), sight.far - unit, unit
+    z = sight.near / depth
+    direction = along_axes(forward, sight.right, sight.up, x_v, y_v)
+    return (eye[0], eye[1], eye[2]), direction, z, z
+
+
 @called
 def tile_rays(
-    kind, alpha, reach, light, seed, first, x0, y0, prim_id, depth, vertices, faces,
-    eye, right, up, forward, inv_focal, near,
+    kind, alpha, reach, light, seed, first, x0, y0, prim_id, depth, vertices, faces, sight,
     origin, direction, pixel, t_near, t_far, kept,
 ):  # fmt: skip
     """Write the rays of the tile at (x0, y0) from row `first` on; see `surface_rays`."""
     height, width = prim_id.shape
-    e = eye[0], eye[1], eye[2]
     i = first
     for code in range(TILE * TILE):
         x, y = x0 + MORTON[code, 0], y0 + MORTON[code, 1]
@@ -201,15 +229,9 @@ def tile_rays(
         b = corner(vertices, faces[prim_id[y, x], 1])
         c = corner(vertices, faces[prim_id[y, x], 2])
         a64 = np.float64(a[0]), np.float64(a[1]), np.float64(a[2])
-        x_v = (x + 0.5 - 0.5 * width) * inv_focal
-        y_v = (0.5 * height - y - 0.5) * inv_focal
-        d = (
-            forward[0] + x_v * right[0] + y_v * up[0],
-            forward[1] + x_v * right[1] + y_v * up[1],
-            forward[2] + x_v * right[2] + y_v * up[2],
-        )
+        e, d, z, unit = sight_of(x, y, np.float64(depth[y, x]), sight)
         n = normal_towards(a64, b, c, d)
-        o = surface_point(a64, n, d, e, near / np.float64(depth[y, x]))
+        o = surface_point(a64, n, d, e, z, unit)
         r, far = aim(kind, x, y, d, n, o, alpha, reach, light, seed)
         far = np.float32(far)
         pixel[i, 0], pixel[i, 1] = x, y
@@ -225,8 +247,8 @@ def tile_rays(
 
 @parallel_kernel
 def surface_rays(
-    share, kind, alpha, reach, light, seed, prim_id, depth, vertices, faces,
-    eye, right, up, forward, inv_focal, near, tiles_x, starts,
+    share, kind, alpha, reach, light, seed, prim_id, depth, vertices, faces, sight,
+    tiles_x, starts,
     origin, direction, pixel, t_near, t_far, kept,
 ):  # fmt: skip
     """Write one ray for each covered pixel, tile by tile in Morton order.
@@ -240,6 +262,5 @@ def surface_rays(
         tile_rays(
             kind, alpha, reach, light, seed, starts[tile],
             (tile % tiles_x) << TILE_LOG2, (tile // tiles_x) << TILE_LOG2,
-            prim_id, depth, vertices, faces, eye, right, up, forward, inv_focal, near,
-            origin, direction, pixel, t_near, t_far, kept,
+            prim_id, depth, vertices, faces, sight, origin, direction, pixel, t_near, t_far, kept,
         )  # fmt: skip

@@ -163,32 +163,32 @@ def _within_a_pixel(case: BuiltCase, asked: Bool, t: F64, pixel: Any) -> Bool:
     middle = (truth.t_low[at, first] + truth.t_high[at, first]) / 2
     is_hit = truth.prim_id[at] >= 0
     prim = np.where(is_hit, truth.prim_id[at], first)
-    true, true_z = _project(case, at, np.where(is_hit, truth.t[at], middle))
-    claimed, z = _project(case, at, t[at])
+    true, true_depth = _project(case, at, np.where(is_hit, truth.t[at], middle))
+    claimed, depth = _project(case, at, t[at])
     apart = np.abs(claimed - true).max(axis=1)
     by_pixel = (pixel[at] >= 0).all(axis=1)
     apart = np.where(by_pixel, np.fmin(apart, np.abs(pixel[at] + 0.5 - true).max(axis=1)), apart)
     with np.errstate(divide="ignore", invalid="ignore"):
-        change = np.abs(true_z / z - 1)  # of depth, relative to the true one
-        close[at] = (true_z > 0) & (z > 0) & (apart <= 1) & (
-            change <= _depth_change(case, prim, true_z) + 0.05
+        change = np.abs(depth / true_depth - 1)
+        close[at] = (true_depth > 0) & (depth > 0) & (apart <= 1) & (
+            change <= _depth_change(case, prim, true_depth) + 0.05
         )  # fmt: skip
     return close
 
 
 def _project(case: BuiltCase, at: Any, t: F64) -> tuple[F64, F64]:
-    """Return where the points at t are on screen, (N, 2), and their z_view."""
+    """Return where the points at t are on screen, (N, 2), and their depth."""
     o, d = (a[at].astype(np.float64) for a in (case.rays.origin, case.rays.direction))
-    q = (o + t[:, None] * d - np.array(case.camera.eye)) @ case.camera.pixel_from_world.T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return q[:, :2] / q[:, 2:], q[:, 2]
+    seen = hrt.project(case.camera, o + t[:, None] * d)
+    return seen[:, :2], seen[:, 2]
 
 
-def _depth_change(case: BuiltCase, prim: Any, z: F64) -> F64:
+def _depth_change(case: BuiltCase, prim: Any, depth: F64) -> F64:
     """Return by which share the depth of triangles (N,) changes from one pixel to the next."""
     a, b, c = (case.scene.vertices[case.scene.faces[prim, k]].astype(np.float64) for k in range(3))
-    normal = np.cross(b - a, c - a)
-    height = (normal * (a - np.array(case.camera.eye))).sum(axis=1)
-    slopes = normal @ np.linalg.inv(case.camera.pixel_from_world)  # 1 / z is linear on screen
+    view, normal = case.camera.arrays, np.cross(b - a, c - a)
+    height = (normal * (a - view.eye)).sum(axis=1)
+    below = height * view.frame[3, 3] - normal @ view.frame[3, :3]
+    slopes = view.sigma * (normal @ view.frame[:2, :3].T)  # depth is linear on the screen
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.abs(slopes[:, :2] / height[:, None]).sum(axis=1) * z)
+        return np.asarray(np.abs(slopes / below[:, None]).sum(axis=1) / depth)

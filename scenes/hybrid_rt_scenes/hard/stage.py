@@ -53,7 +53,7 @@ def room() -> hrt.Scene:
 
 def front(
     width: int = WIDTH, height: int = HEIGHT, *, vfov_deg: float = 60.0, near: float = 0.05
-) -> hrt.Camera:
+) -> hrt.Pinhole:
     """Return a camera that looks into the room, at no special angle."""
     return hrt.Camera.look_at(
         (0.3, 1.3, 3.9), (-0.1, 0.8, -2), vfov_deg=vfov_deg, width=width, height=height, near=near
@@ -62,7 +62,7 @@ def front(
 
 def straight(
     width: int = WIDTH, height: int = HEIGHT, *, eye: Any = (0, 1, 3.5), near: float = 0.0625
-) -> hrt.Camera:
+) -> hrt.Pinhole:
     """Return a camera along -Z at 90 degrees: 1 unit is height / 2 pixels at a distance of 1."""
     eye3 = np.asarray(eye, np.float64)
     return hrt.Camera.look_at(

@@ -117,7 +117,8 @@ def test_tables_and_figures_are_written(finished):
     flat = " ".join(text.split())
     assert f"**Verdict.** {json.loads(done.stdout)['verdict']} Run `" in flat
     figures = {p.name for p in (folder / "figures").iterdir()}
-    assert {"paper-sphere-front.png", "paper-sphere-low.png", "alpha-by-camera.png"} <= figures
+    for name in ("paper-sphere-front", "paper-sphere-low", "alpha-by-camera"):
+        assert {f"{name}.png", f"{name}.svg"} <= figures
 
 
 def test_report_renders_an_old_run_and_compare_compares_it(finished, monkeypatch, capsys):
@@ -167,7 +168,7 @@ def test_ctrl_c_keeps_finished_cells(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("what", ["status", "all"])
+@pytest.mark.parametrize("what", ["status", "depth", "normals", "all"])
 def test_render_writes_a_picture(tmp_path, what):
     path = tmp_path / "x.png"
     done = shell(
@@ -175,7 +176,8 @@ def test_render_writes_a_picture(tmp_path, what):
     )
     assert done.returncode == 0, done.stderr
     image = Image.open(path)
-    assert image.width == (320 if what == "status" else 650)
+    assert image.width == (652 if what == "all" else 320)
+    assert image.height > (180 if what != "all" else 360)  # a legend or a scale stands below
     assert len(set(image.convert("RGB").get_flattened_data())) > 100
 
 

@@ -487,7 +487,9 @@ def test_the_report_is_made_of_the_files_alone(tmp_path):
         "1.0e-03",
     )
     assert "not run" not in drawn.values()
-    assert [path.name for path in written] == ["tables.md", "rays-by-program.png"]
+    assert [path.name for path in written] == [
+        "tables.md", "rays-by-program.png", "rays-by-program.svg"
+    ]  # fmt: skip
 
 
 def test_the_figure_has_a_panel_a_scene_and_says_what_did_not_run(tmp_path):

@@ -333,4 +333,6 @@ def test_the_report_is_made_of_the_files_alone(tmp_path, record):
     assert fast["gathers, G elements/s, 1 thread"] == "0.125"
     assert fast["gathers, G elements/s, 2 threads"] == "0.250"
     _, written = render_run(data)
-    assert [path.name for path in written] == ["tables.md", "gather-rate.png", "march-budget.png"]
+    assert [path.name for path in written] == [
+        "tables.md", "gather-rate.png", "gather-rate.svg", "march-budget.png", "march-budget.svg"
+    ]  # fmt: skip

@@ -14,6 +14,7 @@ from hybrid_rt_bench.judged import tables as error_tables
 from hybrid_rt_bench.judged.cell import _timing_columns
 from hybrid_rt_bench.judged.columns import MAP_CLASSES, PREPARED, SCHEMA, VERDICTS
 from hybrid_rt_bench.kinds.error.tables import tables as kind_tables
+from hybrid_rt_bench.report import looks
 from hybrid_rt_bench.results import folder as results
 from hybrid_rt_bench.runs import compare_runs, read_run, render_run
 from support.bench_rows import ENVIRONMENT
@@ -201,7 +202,7 @@ def test_report_writes_every_figure_from_the_files_alone(run):
     names = {p.name for p in written}
     for name in ("speed-against-error", "march-rate-against-error", "speed-against-error-by-scene",
                  "alpha-by-workload", "speedup-by-workload", "errors-atrium-front"):  # fmt: skip
-        assert f"{name}.png" in names
+        assert {f"{name}.png", f"{name}.svg"} <= names
     maps = sorted(p.name for p in (run.folder / "figures" / "maps" / "street-front").iterdir())
     assert maps == ["certified.png", "paper.png", "thick.png"]
     assert all(p.read_bytes() == content for p, content in before.items())
@@ -231,7 +232,7 @@ def test_a_run_without_any_error_is_drawn(tmp_path):
     rate = hrt.Rate.of(0, 1000)
     dots = [pareto.Dot("certified", "lists 8", True, rate, 1.2, 1.1, 1.3)]
     figure = Figure()
-    pareto._draw(figure, figure.add_subplot(), dots, break_even=True)
+    pareto._draw(figure.add_subplot(), dots, ["certified"], break_even=True)
     figure.savefig(tmp_path / "x.png")
     assert (tmp_path / "x.png").stat().st_size > 1000
 
@@ -242,11 +243,11 @@ def test_map_colours_errors_and_keeps_them_when_reduced():
     classes[3, 5] = MAP_CLASSES["false_hit"]
     classes[0, 0:2] = MAP_CLASSES["wrong_primitive"]
     full = error_maps.error_map(grey, classes)
-    assert tuple(full[3, 5]) == error_maps.COLOURS["false_hit"]
-    small = error_maps._fitted(grey, classes)
+    assert tuple(full[3, 5]) == looks.rgb(looks.VERDICTS["false_hit"])
+    small = error_maps.fitted(grey, classes)
     assert small.shape == (2, error_maps.PANEL, 3)
-    assert tuple(small[1, 2]) == error_maps.COLOURS["false_hit"]
-    assert tuple(small[0, 0]) == error_maps.COLOURS["wrong_primitive"]
+    assert tuple(small[1, 2]) == looks.rgb(looks.VERDICTS["false_hit"])
+    assert tuple(small[0, 0]) == looks.rgb(looks.VERDICTS["wrong_primitive"])
     assert len({tuple(pixel) for pixel in small.reshape(-1, 3)}) == 3
 
 

@@ -214,7 +214,7 @@ def _draw(
 
     runners = _prepared(contenders, RASTER, prepare, on_pass)
     threads = next((c.opened.threads for c in contenders if c.opened), 1)
-    scene = gbuffer.scene
+    scene = gbuffer.known_scene
     _time(runners, lambda: hrt.rasterize(scene, camera, threads=threads), pixels, rounds)
     return runners
 

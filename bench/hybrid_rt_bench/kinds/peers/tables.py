@@ -60,7 +60,8 @@ def rays(run: RunData) -> Table:
     table.notes += [
         f"Mean over views ({views_text(run)}) of the median of {rounds} rounds; "
         f"{threads_text(threads)} where a program takes a number. In each round a peer runs right "
-        "beside the strongest Embree on the same rays. Time per ray over that of the strongest Embree: geometric mean "
+        "beside the strongest Embree on the same rays. Time per ray over that of the strongest "
+        "Embree: geometric mean "
         "over views of the median of the paired ratios, [95 % bootstrap interval over rounds]; "
         "the row embree is that against itself.",
         "Timed: from rays in a peer's own arrays to its evaluated results. Making those arrays, "

@@ -18,6 +18,7 @@ from hybrid_rt.kernels.techniques.certified.scalar import (
     E,
 )
 from hybrid_rt.kernels.techniques.certified.slots import (
+    AT_W,
     BEST,
     BEST_X,
     BEST_Y,
@@ -27,7 +28,7 @@ from hybrid_rt.kernels.techniques.certified.slots import (
     END,
     ENTRY,
     F32,
-    GZ,
+    GW,
     HIGH,
     I32,
     INV_X,
@@ -64,7 +65,6 @@ from hybrid_rt.kernels.techniques.certified.slots import (
     Z_ERROR,
     S,
     W,
-    Z,
     append,
     at,
     edge_at,
@@ -264,7 +264,7 @@ def test(tests, n_tests, looks, slots_f, slots_i, slots_d, corners, any_hit, wor
                 on = on & ~hit
             else:
                 along = high - t_near
-                at_hit = along / (at(slots_d, Z, slot, hit) + along * at(slots_d, GZ, slot, hit))
+                at_hit = along / (at(slots_d, AT_W, slot, hit) + along * at(slots_d, GW, slot, hit))
                 cut = simd.to_f32(at_hit * at(slots_d, SCALE, slot, hit) * BEYOND)
                 # at_hit is negative behind the eye
                 sooner = hit & (at_hit >= 0.0)

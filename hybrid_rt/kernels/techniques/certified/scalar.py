@@ -151,14 +151,14 @@ def leaves_bounds(o, d, low, high):
 
 
 @inlined
-def clip_end(how, s_end, start, stop, z, gz, o, d, low, high):
+def clip_end(how, s_end, start, stop, w, gw, o, d, low, high):
     """Return (status, s_end, is anything left) of a ray whose end is drawn in to where it matters.
 
     After t_far nothing counts, and outside of the scene's bounds there is nothing.
     """
     last_t = min(stop, leaves_bounds(o, d, low, high))
     if start <= last_t < math.inf:
-        s_last = (last_t - start) / (z + (last_t - start) * gz)
+        s_last = (last_t - start) / (w + (last_t - start) * gw)
         if s_last >= 0.0 and s_last * BEYOND < s_end:
             how, s_end = MISS, max(s_last, SHORTEST)
     if last_t < start:
@@ -167,12 +167,15 @@ def clip_end(how, s_end, start, stop, z, gz, o, d, low, high):
 
 
 @inlined
-def trusted(o, d, t_near, eye, z, s_end, spread):
+def trusted(o, d, t_near, eye, w, s_end, highest, spread, deep, apart):
     """Is the float64 set-up of a ray exact enough.
 
-    A place on the screen is a row of M times p, by z, with p = o + t_near d - eye, every sum of
-    which rounds by e times the sizes of its terms; a motion is s_end times a row of M times d.
-    `spread` bounds the rows of M: the sum of absolute entries, those of x and y divided by L.
+    A place on the screen is a row of M times (p, 1), by w, with p = o + t_near d - eye, every sum
+    of which rounds by e times the sizes of its terms; a motion is s_end times a row of M times d.
+    `spread` bounds the rows of M: the sum of absolute entries, those of x and y divided by L. So
+    does `deep` the row of d, whose error counts against `highest`, the larger depth of the ray's
+    two ends; it is 0 for a pinhole, where d is exact. `apart` is a length that bounds the rows'
+    constants by their other entries; it is 0 for a pinhole, which has none.
     """
     place = 0.0
     motion = 0.0
@@ -180,7 +183,8 @@ def trusted(o, d, t_near, eye, z, s_end, spread):
         size = abs(np.float64(d[k]))
         place = max(place, abs(np.float64(o[k])) + t_near * size + abs(eye[k]))
         motion = max(motion, size)
-    return 2.0**-50 * spread * max(place / z, motion * s_end) <= U / 8.0
+    error = 2.0**-50 * max((place + apart) / w, motion * s_end)
+    return spread * error <= U / 8.0 and deep * error <= U / 8.0 * highest
 
 
 @inlined
@@ -233,7 +237,7 @@ def walk(
     o, d, t_near, t_far, ray, lists, pyramid, scene, limits, steps_by_level
 ):  # fmt: skip
     """March one ray; return (status, pixel x, pixel y, prim, t, s proven free, steps, tests)."""
-    status, x, y, depth, dx, dy, dz, s_end, z, gz = ray
+    status, x, y, depth, dx, dy, dz, s_end, w, gw = ray
     prim_id, nearest, rest, planes = lists
     cells, offsets, pitches = pyramid
     vertices, faces, _ = scene
@@ -303,7 +307,7 @@ def walk(
                 best, best_low, best_high, best_x, best_y = prim, low, high, cx, cy
                 if any_hit:
                     return HIT, cx, cy, best, 0.5 * (low + high), s / scale, steps, tests
-                at_hit = (high - t_near) / (z + (high - t_near) * gz)
+                at_hit = (high - t_near) / (w + (high - t_near) * gw)
                 if at_hit >= 0.0:  # negative: behind the eye
                     end = min(end, F(at_hit * scale * BEYOND))
                     s_exit = max(min(leave, end), s)
@@ -329,7 +333,7 @@ def walk(
         if level < top and (cx >> (level + 1) != lx >> 1 or cy >> (level + 1) != ly >> 1):
             level += 1
     if best >= 0:
-        at_hit = (best_high - t_near) / (z + (best_high - t_near) * gz)
+        at_hit = (best_high - t_near) / (w + (best_high - t_near) * gw)
         if at_hit >= 0.0 and F(at_hit * scale * BEYOND) <= end:
             t = 0.5 * (best_low + best_high)
             return HIT, best_x, best_y, best, t, s / scale, steps, tests
@@ -350,23 +354,26 @@ def march_chunk(
     for i in range(first, last):
         o, d = rays.origin[i], rays.direction[i]
         start, stop = np.float64(rays.t_near[i]), np.float64(rays.t_far[i])
-        how, x, y, z0, dx, dy, dz, s_end, z, gz = place(
+        how, x, y, z0, dx, dy, dz, s_end, w, gw = place(
             np.float64(o[0]), np.float64(o[1]), np.float64(o[2]),
             np.float64(d[0]), np.float64(d[1]), np.float64(d[2]),
-            start, math.inf, box.m, box.eye, box.near, width, height,
+            start, math.inf, box.m, box.eye, width, height,
         )  # fmt: skip
         if how != INVALID and not stop >= start:
             how, s_end = INVALID, -1.0
         hit_x, hit_y, found, at, s_free, count, tested = -1, -1, -1, math.inf, 0.0, 0, 0
         if s_end >= 0.0:
-            how, s_end, some = clip_end(how, s_end, start, stop, z, gz, o, d, box.low, box.high)
+            how, s_end, some = clip_end(how, s_end, start, stop, w, gw, o, d, box.low, box.high)
             if not some:
                 pass
-            elif not (s_end < math.inf) or not trusted(o, d, start, box.eye, z, s_end, box.spread):
+            elif not (s_end < math.inf) or not trusted(
+                o, d, start, box.eye, w, s_end, max(z0, z0 + dz * s_end),
+                box.spread, box.deep, box.apart,
+            ):  # fmt: skip
                 how = UNDECIDED
             else:
                 how, hit_x, hit_y, found, at, s_free, count, tested = walk(
-                    o, d, start, stop, (how, x, y, z0, dx, dy, dz, s_end, z, gz),
+                    o, d, start, stop, (how, x, y, z0, dx, dy, dz, s_end, w, gw),
                     lists, pyramid, scene, limits, steps_by_level,
                 )  # fmt: skip
         tests[0] += tested
@@ -383,7 +390,7 @@ def march_chunk(
             out.t_free[i] = 0.0
         else:
             # Rounded down: what is proven is proven up to here at least.
-            free = ray_t(s_free / BEYOND, z, gz, start)
+            free = ray_t(s_free / BEYOND, w, gw, start)
             out.t_free[i] = F(min(free * (1.0 - 2.0**-22), stop))
 
 

@@ -13,13 +13,14 @@ from hybrid_rt.kernels.techniques.certified.scalar import (
     U,
 )
 from hybrid_rt.kernels.techniques.certified.slots import (
+    AT_W,
     BEST,
     CODE,
     CX,
     CY,
     END,
     F32,
-    GZ,
+    GW,
     HIGH,
     HOW,
     I32,
@@ -51,10 +52,10 @@ from hybrid_rt.kernels.techniques.certified.slots import (
     Z0,
     Z_ERROR,
     S,
-    Z,
     put,
 )
 from hybrid_rt.kernels.techniques.screen import (
+    BEFORE_FAR,
     INVALID,
     MISS,
     NEAR,
@@ -65,7 +66,7 @@ from hybrid_rt.kernels.techniques.screen import (
 
 @inlined
 def row_of(m, k, x, y, z):
-    """Return row k of a 3x3 matrix times a vector."""
+    """Return row k of a map, without its constant, times a vector."""
     return m[k, 0] * x + m[k, 1] * y + m[k, 2] * z
 
 
@@ -101,7 +102,7 @@ def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_ou
     """
     origin, direction, t_nears, t_fars = rays
     width, height = size
-    m, eye, near, spread, low, high = box
+    m, eye, spread, deep, apart, low, high = box
     at = index * I32(3)
     ofx = simd.gather(origin, at, live, F32(0.0))
     ofy = simd.gather(origin, at + I32(1), live, F32(0.0))
@@ -119,16 +120,22 @@ def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_ou
     valid = finite(ox + oy + oz) & finite(length) & (length > 0.0) & (start < INFINITY)
     valid = valid & (stop >= start) & (start <= INFINITY)
     px, py, pz = ox + start * dx - eye[0], oy + start * dy - eye[1], oz + start * dz - eye[2]
-    qx, qy, z = row_of(m, 0, px, py, pz), row_of(m, 1, px, py, pz), row_of(m, 2, px, py, pz)
-    in_front = valid & (z >= near)
-    x, y = qx / z, qy / z
-    placed = in_front & (x >= 0.0) & (x <= width) & (y >= 0.0) & (y <= height)
-    gx, gy, gz = row_of(m, 0, dx, dy, dz), row_of(m, 1, dx, dy, dz), row_of(m, 2, dx, dy, dz)
-    depth = near / z
-    delta_x, delta_y, delta_z = gx - x * gz, gy - y * gz, -depth * gz
-    ahead = simd.select(gz > 0.0, 1.0 / gz, INFINITY)
-    s_end = simd.select(gz < 0.0, (near - z) / (gz * near), ahead)
-    how = simd.select(gz < 0.0, simd.i32(NEAR), simd.i32(MISS))
+    w, d = row_of(m, 2, px, py, pz) + m[2, 3], row_of(m, 3, px, py, pz) + m[3, 3]
+    in_front = valid & (w >= d)
+    x = (row_of(m, 0, px, py, pz) + m[0, 3]) / w
+    y = (row_of(m, 1, px, py, pz) + m[1, 3]) / w
+    depth = d / w
+    placed = in_front & (x >= 0.0) & (x <= width) & (y >= 0.0) & (y <= height) & (depth > 0.0)
+    gx, gy = row_of(m, 0, dx, dy, dz), row_of(m, 1, dx, dy, dz)
+    gw, gd = row_of(m, 2, dx, dy, dz), row_of(m, 3, dx, dy, dz)
+    delta_x, delta_y, delta_z = gx - x * gw, gy - y * gw, gd - depth * gw
+    ahead, closer = gw > 0.0, ~(gw > 0.0) & (gw < gd)
+    farther = ~ahead & ~closer & (gd < 0.0)
+    s_end = simd.select(ahead, 1.0 / gw, INFINITY)
+    s_end = simd.select(closer, (d - w) / (d * gw - w * gd), s_end)
+    s_end = simd.select(farther, BEFORE_FAR * (depth / -delta_z), s_end)
+    how = simd.select(closer, simd.i32(NEAR), simd.i32(MISS))
+    how = simd.select(farther, I32(OFFSCREEN), how)
     side = (simd.select(delta_x > 0.0, simd.f64(width), simd.f64(0.0)) - x) / delta_x
     sooner = (delta_x != 0.0) & (side < s_end)
     s_end = simd.select(sooner, side, s_end)
@@ -144,7 +151,7 @@ def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_ou
     t_exit = leave_axis(t_exit, oz, dz, low[2], high[2])
     t_exit = simd.select(t_exit > -INFINITY, t_exit + 2.0**-40 * simd.absolute(t_exit), t_exit)
     last = simd.minimum(t_exit, stop)
-    s_last = (last - start) / (z + (last - start) * gz)
+    s_last = (last - start) / (w + (last - start) * gw)
     drawn = (start <= last) & (last < INFINITY) & (s_last >= 0.0) & (s_last * BEYOND < s_end)
     how = simd.select(drawn, I32(MISS), how)
     s_end = simd.select(drawn, simd.maximum(s_last, SHORTEST), s_end)
@@ -156,8 +163,10 @@ def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_ou
     place = simd.maximum(place, simd.absolute(oy) + start * sizes_y + abs(eye[1]))
     place = simd.maximum(place, simd.absolute(oz) + start * sizes_z + abs(eye[2]))
     motion = simd.maximum(simd.maximum(sizes_x, sizes_y), sizes_z)
-    error = 2.0**-50 * spread * simd.maximum(place / z, motion * s_end)
-    trusted = (error <= U / 8.0) & (s_end < INFINITY)
+    error = 2.0**-50 * simd.maximum((place + apart) / w, motion * s_end)
+    highest = simd.maximum(depth, depth + delta_z * s_end)
+    trusted = (spread * error <= U / 8.0) & (deep * error <= U / 8.0 * highest)
+    trusted = trusted & (s_end < INFINITY)
     walks = placed & ~nothing & trusted
 
     # How the others end.
@@ -174,7 +183,6 @@ def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_ou
     sx, inv_x = slope_of(delta_x / scale)
     sy, inv_y = slope_of(delta_y / scale)
     x0, y0 = simd.to_f32(x), simd.to_f32(y)
-    highest = simd.maximum(depth, depth + delta_z * s_end)
     z0 = simd.to_f32(depth - DEPTH_ULPS * U * highest)
     walks = walks & live
     put(slots_f, X0, slot, x0, walks)
@@ -201,8 +209,8 @@ def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_ou
     put(slots_d, HIGH, slot, stop, walks)
     put(slots_i, HOW, slot, how, walks)
     put(slots_d, SCALE, slot, scale, walks)
-    put(slots_d, Z, slot, z, walks)
-    put(slots_d, GZ, slot, gz, walks)
+    put(slots_d, AT_W, slot, w, walks)
+    put(slots_d, GW, slot, gw, walks)
     put(slots_d, T_NEAR, slot, start, walks)
     put(slots_d, T_FAR, slot, stop, walks)
 

@@ -22,7 +22,7 @@ X0, Y0, Z0, SX, SY, SZ, INV_X, INV_Y, END, S, Z_ERROR, OX, OY, OZ, F32_ROWS = ra
 RAY, KZ, HOW, CX, CY, LEVEL, STEPS, ENTRY, PRIM, TESTS = range(10)
 BEST, BEST_X, BEST_Y, CODE, I32_ROWS = range(10, 15)
 # float64: what leads from s to t, limits, the shear of the exact test; bounds of the best hit's t.
-SCALE, Z, GZ, T_NEAR, T_FAR, SHEAR_X, SHEAR_Y, SHEAR_Z, LOW, HIGH, F64_ROWS = range(11)
+SCALE, AT_W, GW, T_NEAR, T_FAR, SHEAR_X, SHEAR_Y, SHEAR_Z, LOW, HIGH, F64_ROWS = range(11)
 
 # What a worker counts, int64: of each stage the vectors that it went through and the lanes of them
 # that were at work. A step reads the pyramid; a pass leaves a pixel that has been looked at.

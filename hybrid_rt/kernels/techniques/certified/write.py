@@ -11,12 +11,13 @@ from hybrid_rt.kernels.techniques.certified.scalar import (
 )
 from hybrid_rt.kernels.techniques.certified.slots import (
     ARRIVED,
+    AT_W,
     BEST,
     BEST_X,
     BEST_Y,
     CODE,
     END,
-    GZ,
+    GW,
     HIGH,
     HOW,
     I32,
@@ -30,7 +31,6 @@ from hybrid_rt.kernels.techniques.certified.slots import (
     T_NEAR,
     S,
     W,
-    Z,
 )
 from hybrid_rt.kernels.techniques.screen import (
     HIT,
@@ -53,14 +53,14 @@ def write(many, slots_f, slots_i, slots_d, out):
         best = simd.load(slots_i, BEST * STRIDE + k)
         start = simd.load(slots_d, T_NEAR * STRIDE + k)
         stop = simd.load(slots_d, T_FAR * STRIDE + k)
-        z = simd.load(slots_d, Z * STRIDE + k)
-        gz = simd.load(slots_d, GZ * STRIDE + k)
+        w = simd.load(slots_d, AT_W * STRIDE + k)
+        gw = simd.load(slots_d, GW * STRIDE + k)
         scale = simd.load(slots_d, SCALE * STRIDE + k)
         low = simd.load(slots_d, LOW * STRIDE + k)
         high = simd.load(slots_d, HIGH * STRIDE + k)
         arrived = code == I32(ARRIVED)
         along = high - start
-        at_hit = along / (z + along * gz)
+        at_hit = along / (w + along * gw)
         found = best >= I32(0)
         reached = found & (at_hit >= 0.0) & (simd.to_f32(at_hit * scale * BEYOND) <= end)
         how = simd.load(slots_i, HOW * STRIDE + k)
@@ -70,8 +70,8 @@ def write(many, slots_f, slots_i, slots_d, out):
         miss = code == I32(MISS)
         # ray_t, rounded down: what is proven is proven up to here at least.
         s_free = simd.to_f64(s) / scale / BEYOND
-        below = 1.0 - s_free * gz
-        free = simd.select(below <= 0.0, INFINITY, start + s_free * z / below)
+        below = 1.0 - s_free * gw
+        free = simd.select(below <= 0.0, INFINITY, start + s_free * w / below)
         free = simd.select(miss, stop, simd.minimum(free * (1.0 - 2.0**-22), stop))
         middle = simd.select(hit, simd.minimum(0.5 * (low + high), LARGEST_T), INFINITY)
         simd.scatter(prim_id, i, simd.select(hit, best, I32(-1)), live)

@@ -23,10 +23,11 @@ VERTEX = """
 #version 450
 in vec3 position;
 uniform vec3 eye, eye_rest, to_x, to_y, to_w;
-uniform float near;
+uniform vec3 to_depth;
+uniform vec4 at_eye;
 void main() {
     vec3 q = (position - eye) - eye_rest;
-    gl_Position = vec4(dot(to_x, q), dot(to_y, q), near, dot(to_w, q));
+    gl_Position = vec4(dot(to_x, q), dot(to_y, q), dot(to_depth, q), dot(to_w, q)) + at_eye;
 }
 """
 FRAGMENT = """
@@ -59,7 +60,7 @@ _FUNCTIONS: dict[str, tuple[Any, ...]] = {
 class Llvmpipe(Opened):
     """Depth and gl_PrimitiveID of a camera, by llvmpipe.
 
-    Depth is ours: ``near / z_view``, in a float32 depth buffer, nearest is largest, nothing is far
+    Depth is ours, see `hybrid_rt.project`, in a float32 depth buffer: nearest is largest, 0 is far
     away. The picture is drawn upside down, so that its first row in memory is the top one.
 
     ``LP_NUM_THREADS`` is set to `threads`. llvmpipe starts so many threads for its tiles of 64x64
@@ -72,18 +73,17 @@ class Llvmpipe(Opened):
         os.environ["LP_NUM_THREADS"] = str(threads)
         os.environ["LIBGL_ALWAYS_SOFTWARE"] = "true"
         os.environ["GALLIUM_DRIVER"] = "llvmpipe"
-        libraries = {
+        libraries: dict[str, Any] = {
             f"lib{name.lower()}": file
             for name in ("EGL", "GL")
             if (file := ctypes.util.find_library(name)) is not None
         }
-        self._context = moderngl.create_context(
-            standalone=True, backend="egl", require=450, **libraries
-        )
+        settings: dict[str, Any] = {"backend": "egl", **libraries}
+        self._context = moderngl.create_context(standalone=True, require=450, **settings)
         renderer = self._context.info["GL_RENDERER"]
         if "llvmpipe" not in renderer:
             raise PeerError(f"expected Mesa's llvmpipe behind EGL, got {renderer}")
-        self._gl = _functions(libraries.get("libegl", "libEGL.so.1"))
+        self._gl = functions(libraries.get("libegl", "libEGL.so.1"))
         self.detail = f"{renderer}, {self._context.info['GL_VERSION']}"
         start = time.perf_counter()
         self._program = self._context.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
@@ -161,7 +161,7 @@ class Llvmpipe(Opened):
             self._frame = None
 
 
-def _functions(library: str) -> dict[str, Any]:
+def functions(library: str) -> dict[str, Any]:
     """Return functions of OpenGL by name, as EGL finds them."""
     find = ctypes.CDLL(library).eglGetProcAddress
     find.restype, find.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
@@ -181,14 +181,17 @@ def _uniforms(camera: hrt.Camera) -> dict[str, Any]:
     """
     eye = np.array(camera.eye)
     high = eye.astype(np.float32).astype(np.float64)
-    x, y = (2 * camera.focal_px / size for size in (camera.width, camera.height))
+    m = camera.arrays.m
+    # Clip space from -w to w, y down: twice a place over the size, less 1.
+    x, y = 2.0 * m[0] / camera.width - m[2], 2.0 * m[1] / camera.height - m[2]
     return {
         "eye": tuple(high),
         "eye_rest": tuple(eye - high),
-        "to_x": tuple(x * np.array(camera.right)),
-        "to_y": tuple(-y * np.array(camera.up)),
-        "to_w": camera.forward,
-        "near": camera.near,
+        "to_x": tuple(x[:3]),
+        "to_y": tuple(y[:3]),
+        "to_depth": tuple(m[3, :3]),
+        "to_w": tuple(m[2, :3]),
+        "at_eye": (x[3], y[3], m[3, 3], m[2, 3]),
     }
 
 
