@@ -1,6 +1,5 @@
 """docs/results and the findings in README are what `make results` makes of the committed runs."""
 
-import dataclasses
 import json
 import os
 import re
@@ -17,7 +16,7 @@ from hybrid_rt_bench.measure.experiment import Resolution
 from hybrid_rt_bench.registry import kinds
 from hybrid_rt_bench.runs import read_run, render_run
 from hybrid_rt_scenes import get_scene
-from support import PYTHONPATH, made_runs
+from support import PYTHONPATH
 
 COMMITTED = docs_results.committed()
 SMALL = 500_000
@@ -139,14 +138,3 @@ def test_no_other_figures_are_in_readme():
 
 def test_readme_is_short():
     assert len(docs_results.README.read_text(encoding="utf-8").splitlines()) < 120
-
-
-def test_findings_say_what_part_of_a_model_a_scene_is(tmp_path):
-    run = made_runs.judged_run(
-        tmp_path, made_runs.LAYOUTS["one scene, two techniques"], kind="hybrid"
-    )
-    run = dataclasses.replace(run, results=run.results.assign(speedup=0.5))
-    scenes = [{**entry, "mark": "half", "note": "no roof"} for entry in run.meta["scenes"]]
-    marked = dataclasses.replace(run, meta={**run.meta, "scenes": scenes})
-    assert "hall (half)" in docs_results.findings({"hybrid": marked}, "")
-    assert "(half)" not in docs_results.findings({"hybrid": run}, "")
