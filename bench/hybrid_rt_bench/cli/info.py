@@ -55,7 +55,9 @@ def info(
     out.print(table)
     for spec in there:
         if spec.mark:
-            out.print(f"{spec.name}, {spec.mark}: {spec.note}.", soft_wrap=True, highlight=False)
+            out.print(
+                f"Scene {spec.name} ({spec.mark}): {spec.note}.", soft_wrap=True, highlight=False
+            )
     problems = env.problems(found)
     if not problems:
         out.print("no problems found", style="green")
