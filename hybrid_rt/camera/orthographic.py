@@ -105,11 +105,11 @@ class Orthographic(Camera):
 
     def z_view(self, depth: Any) -> F64:
         """Return distances from the eye along `forward`, float64, of depths, array_like."""
-        return np.asarray(self.far - np.asarray(depth, np.float64) * self.extent)
+        return np.asarray(self.far - _check.reals("depth", depth) * self.extent)
 
     def depth_at(self, z_view: Any) -> F64:
         """Return depths, float64, of distances from the eye along `forward`, array_like."""
-        return np.asarray((self.far - np.asarray(z_view, np.float64)) / self.extent)
+        return np.asarray((self.far - _check.reals("z_view", z_view)) / self.extent)
 
     def views(self, x: Any, y: Any) -> tuple[F64, F64]:
         """Return the lines of sight through places of the screen; see `Camera.views`."""
@@ -124,13 +124,14 @@ class Orthographic(Camera):
         origin, direction = self.views(x, y)
         return origin + self.near * direction, direction, 0.0, self.extent
 
-    def towards(self, points_w: F64) -> F64:
+    def towards(self, points_w: Any) -> F64:
         """Return the directions, (N, 3) float64, in which points (N, 3) are seen."""
-        return np.broadcast_to(np.array(self.forward), points_w.shape)
+        p = _check.array("points_w", points_w, ("N", 3), np.float64)
+        return np.broadcast_to(np.array(self.forward), p.shape)
 
     def receding(self, length: float) -> tuple[float, float]:
         """Return what `Camera.receding` says: depth falls by as much everywhere."""
-        return 0.0, length / self.extent
+        return 0.0, _check.real("length", length, above=0.0) / self.extent
 
     @property
     def stride_unit(self) -> float:

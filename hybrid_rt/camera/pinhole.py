@@ -123,12 +123,12 @@ class Pinhole(Camera):
     def z_view(self, depth: Any) -> F64:
         """Return distances from the eye along `forward`, float64, of depths, array_like."""
         with np.errstate(divide="ignore"):
-            return np.asarray(self.near / np.asarray(depth, np.float64))
+            return np.asarray(self.near / _check.reals("depth", depth))
 
     def depth_at(self, z_view: Any) -> F64:
         """Return depths, float64, of distances from the eye along `forward`, array_like."""
         with np.errstate(divide="ignore"):
-            return np.asarray(self.near / np.asarray(z_view, np.float64))
+            return np.asarray(self.near / _check.reals("z_view", z_view))
 
     def views(self, x: Any, y: Any) -> tuple[F64, F64]:
         """Return the lines of sight through places of the screen; see `Camera.views`."""
@@ -142,13 +142,14 @@ class Pinhole(Camera):
         """Return rays through places of the screen, from the eye: t is z_view."""
         return *self.views(x, y), self.near, math.inf
 
-    def towards(self, points_w: F64) -> F64:
+    def towards(self, points_w: Any) -> F64:
         """Return the directions, (N, 3) float64, in which points (N, 3) are seen."""
-        return np.asarray(points_w - np.array(self.eye))
+        p = _check.array("points_w", points_w, ("N", 3), np.float64)
+        return np.asarray(p - np.array(self.eye))
 
     def receding(self, length: float) -> tuple[float, float]:
         """Return what `Camera.receding` says: near / (z_view + length) of depths near / z_view."""
-        return length / self.near, 0.0
+        return _check.real("length", length, above=0.0) / self.near, 0.0
 
     @property
     def stride_unit(self) -> float:
