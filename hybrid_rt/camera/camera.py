@@ -302,7 +302,8 @@ class Camera(ABC):
         down = _check.array("y", y, ("N",), np.float64)
         _check.same_length("y", down, "x", len(across))
         (fx, fy), (cx, cy) = self.scale_px, self.centre_px
-        x_v, y_v = (across - cx) / fx, (cy - down) / fy
+        with np.errstate(all="ignore"):
+            x_v, y_v = (across - cx) / fx, (cy - down) / fy
         return np.asarray(x_v[:, None]), np.asarray(y_v[:, None])
 
     @abstractmethod
