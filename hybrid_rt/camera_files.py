@@ -45,7 +45,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import tomli_w
+import tomlkit
 
 from hybrid_rt import _check
 from hybrid_rt.camera.camera import Camera
@@ -150,7 +150,7 @@ def save_cameras(path: str | Path, cameras: Mapping[str, Camera]) -> None:
         form = next(key for key in ("pinhole", "parallel") if type(camera) is FORMS[key])
         values = {f.name: getattr(camera, f.name) for f in dataclasses.fields(camera)}
         tables[name] = {"form": form, **values}
-    text = tomli_w.dumps({"kind": KIND, "schema": SCHEMA, "cameras": tables})
+    text = tomlkit.dumps({"kind": KIND, "schema": SCHEMA, "cameras": tables})
     try:
         path.write_text(text, encoding="utf-8")
     except (OSError, UnicodeEncodeError) as error:

@@ -14,6 +14,7 @@ from hybrid_rt import _check
 from hybrid_rt.registry import Registry
 from hybrid_rt_scenes.automatic import automatic_cameras
 from hybrid_rt_scenes.given import given_cameras
+from hybrid_rt_scenes.places import data_directories
 from hybrid_rt_scenes.spec import CameraSpec, LightsSpec, MeshSpec, SceneSpec
 
 DEFINITIONS = Path(__file__).parent / "definitions"
@@ -45,13 +46,22 @@ def register(scene: SceneSpec) -> SceneSpec:
     return SCENES.register(scene)
 
 
-def _defined() -> list[str]:
-    return [path.stem for path in DEFINITIONS.glob("*.toml")]
+def _defined() -> dict[str, Path]:
+    """Return the definitions by name: those that come with the package, then imported ones."""
+    found: dict[str, Path] = {}
+    for folder in (DEFINITIONS, *data_directories()):
+        for path in sorted(folder.glob("*.toml")):
+            found.setdefault(path.stem, path)
+    return found
 
 
 def scene_names() -> list[str]:
-    """Return the names of all scenes, sorted, whether their data is there or not."""
-    return sorted([*_defined(), *SCENES])
+    """Return the names of all scenes, sorted, whether their data is there or not.
+
+    They are those that come with this package, those that ``hybrid-rt import`` has written to a
+    data directory, a ``NAME.toml`` each, and those of `register`.
+    """
+    return sorted({*_defined(), *SCENES})
 
 
 def get_scene(name: str) -> SceneSpec:
@@ -62,8 +72,8 @@ def get_scene(name: str) -> SceneSpec:
     UnknownNameError
         No such scene; the message suggests the nearest name.
     """
-    if name in _defined():
-        return read_definition(DEFINITIONS / f"{name}.toml")
+    if (path := _defined().get(name)) is not None:
+        return read_definition(path)
     if name not in SCENES:
         raise hrt.UnknownNameError("scene", str(name), scene_names())
     return SCENES[name]
@@ -85,7 +95,7 @@ def read_definition(path: Path) -> SceneSpec:
 def _table(path: Path) -> dict[str, Any]:
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
         raise hrt.ArgumentError(path.name, "a TOML file", str(error)) from error
     if "name" in table:
         raise hrt.UnknownNameError(f"key of {path.name}", "name", set(_keys(SceneSpec)) - {"name"})

@@ -15,7 +15,7 @@ def info(
         typer.Argument(help="A mesh, a definition, a file of cameras, or a scene by name."),
     ] = None,
 ) -> None:
-    """Show what is in a file; or versions, CPU, and what would spoil measurements.
+    """Show what is in a file; or versions, CPU, where scenes are kept, problems of measuring.
 
     Of a mesh: triangles, objects, bounds and cameras.
 
@@ -34,6 +34,7 @@ def info(
     from rich.table import Table
 
     from hybrid_rt_bench.measure import environment as env
+    from hybrid_rt_scenes import data_directories
 
     out = terminal.out()
     load = env.load_average()
@@ -45,6 +46,7 @@ def info(
         elif key == "memory_bytes":
             key, value = "memory", f"{value / 2**30:.1f} GiB"
         table.add_row(key.replace("_", " "), str(value))
+    table.add_row("scenes looked for in", "\n".join(map(str, data_directories())))
     out.print(table)
     problems = env.problems(found)
     if not problems:

@@ -100,7 +100,8 @@ def render(scene: hrt.Scene, camera: hrt.Camera, what: What, threads: int | None
 def depth_image(gbuffer: hrt.GBuffer) -> U8:
     """Return the distance, near bright and far dark on a logarithmic scale; cream where none.
 
-    Of parallel lines of sight the scale is linear, as their depth is. The ends of the scale are the 1st and 99th percentile of the distances in view.
+    Of parallel lines of sight the scale is linear, as their depth is. The ends of the scale are the
+    1st and 99th percentile of the distances in view.
     """
     covered = gbuffer.prim_id >= 0
     image = np.full((*covered.shape, 3), BACKGROUND, np.uint8)
