@@ -370,10 +370,10 @@ def march(
 
     Notes
     -----
-    In "paper" free space is proven at pixel centres only, so some of the answers are wrong by more
-    than a pixel (``hybrid-rt run paper`` measures the rate). "slope" proves it over whole
-    pixels, but only for the planes that the pixels show. "linear", "dda" and "hiz" guess a
-    thickness, and are wrong wherever it is; "hiz" also answers rays with a miss.
+    In "paper" free space is proven at pixel centres only, so a few answers are wrong by more than a
+    pixel (``hybrid-rt run paper`` measures their share). "slope" proves it over whole pixels, but
+    only for the planes that the pixels show. "linear", "dda" and "hiz" guess a thickness, and are
+    wrong wherever it is; "hiz" also answers rays with a miss.
 
     The same bits come out for any number of threads and any order of the rays. Directions of any
     length give the same answers: they are scaled by powers of two.

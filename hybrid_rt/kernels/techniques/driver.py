@@ -132,7 +132,7 @@ def finishes(numbers_class):
 def write(answers, kept, done, marched, rays, prim_ids, width, out):
     """Write the rows of the rays in lanes `done`, of which some have been `marched`."""
     index = simd.to_i64(kept.index)
-    hit = done & (answers.x >= NONE + ONE)
+    hit = done & (answers.x >= 0)
     t_free = rays_t(answers.s_free, kept.w, kept.gw, kept.t_near) * kept.scale
     t_free = simd.select(marched, simd.to_f32(t_free), F0)
     missed = done & (answers.status == np.int32(MISS))
@@ -212,7 +212,7 @@ def march_share(share, rays, view, buffers, pyramid, numbers, out, counts):
     Rays are set up a batch at a time, and finished a vector at a time, so that these stages find
     their lanes full; between them they wait in queues.
     """
-    # The arguments are alive, and counting references to their arrays costs a tenth of the march.
+    # The arguments are alive, and counting references to their arrays costs time in every chunk.
     rays, view, buffers = borrowed_record(rays), borrowed_record(view), borrowed_record(buffers)
     pyramid, out = borrowed_record(pyramid), borrowed_record(out)
     n = len(rays.t_near)
