@@ -1,6 +1,6 @@
 """Sets of cameras in files: TOML of the library's own, definitions of scenes, glTF.
 
-A file of cameras is TOML::
+A file of cameras, see `load_cameras`::
 
     kind = "cameras"
     schema = 1
@@ -33,10 +33,6 @@ A file of cameras is TOML::
     t = [0.1, 0.0, 2.0]
     width = 1280
     height = 720
-
-The keys of a form are the arguments of its method, with the same defaults. `save_cameras` writes
-the forms "pinhole" and "parallel", whose keys are the attributes of the classes: they bring back
-the very same numbers.
 """
 
 from __future__ import annotations
@@ -99,6 +95,23 @@ def load_cameras(path: str | Path) -> dict[str, Camera]:
         value that no camera can have: with the file and the key.
     MeshFileError
         A glTF file that cannot be read.
+
+    Notes
+    -----
+    A file of cameras says ``kind = "cameras"`` and ``schema = 1``; each camera is a table
+    ``[cameras.NAME]`` with a `form`, and the keys of a form are the arguments of a method, with the
+    same defaults:
+
+    ==============  ============================================================================
+    form            keys
+    ==============  ============================================================================
+    "look_at"       eye, target, up, vfov_deg, width, height, near: `Camera.look_at`; the default
+    "orthographic"  eye, target, up, view_height, width, height, near, far: `Camera.orthographic`
+    "matrices"      view, projection, width, height, convention: `Camera.from_matrices`
+    "intrinsics"    K, R, t, width, height, near: `Camera.from_intrinsics`
+    "pinhole"       the attributes of `Pinhole`, as `save_cameras` writes them
+    "parallel"      the attributes of `Orthographic`, as `save_cameras` writes them
+    ==============  ============================================================================
     """
     path = _path(path)
     if path.suffix.lower() in GLTF_SUFFIXES:

@@ -50,6 +50,9 @@ class Kind:
         The columns of its results.
     tables : callable
         Returns the tables of a run, in the order of reading.
+    verdict : callable
+        Returns what a reader of the run takes home: sentences of one paragraph, with the numbers
+        and their intervals. It takes any run that has a measured cell.
     figures : sequence of callable
         Each writes pictures of a run into a folder and returns their paths.
     options : sequence of Option
@@ -68,6 +71,7 @@ class Kind:
     run: Any
     schema: Any
     tables: Any
+    verdict: Any
     figures: Sequence[Any] = ()
     options: Sequence[Option] = ()
     compare: Any = None
@@ -92,6 +96,11 @@ class Kind:
     def table_maker(self) -> Callable[[RunData], list[Table]]:
         """Return what makes the tables."""
         found: Callable[[RunData], list[Table]] = self._found(self.tables)
+        return found
+
+    def verdict_maker(self) -> Callable[[RunData], str]:
+        """Return what says what a run comes to."""
+        found: Callable[[RunData], str] = self._found(self.verdict)
         return found
 
     def figure_makers(self) -> list[Callable[[RunData, Path], list[Path]]]:

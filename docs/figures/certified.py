@@ -1,22 +1,24 @@
-"""Draw docs/figures/certified.png: what the lists hold along the path of one ray of `atrium`.
+"""Draw docs/figures/certified: what the lists hold along the path of two rays of `atrium`.
 
-Run from the repository's root: ``python docs/figures/certified.py``.
+Run from the repository's root: ``python docs/figures/certified.py [FOLDER]``; it writes a PNG and
+an SVG, here by default.
 """
 
+import sys
 from pathlib import Path
 
-import matplotlib
+import matplotlib as mpl
 import numpy as np
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
 
 import hybrid_rt as hrt
 import hybrid_rt_scenes as hrs
+from hybrid_rt_bench.report.looks import AMBER, BLUE, ORANGE, PALE
+from hybrid_rt_bench.report.style import STYLE, footer, legend, panels, save, title
 
 SIZE = (160, 90)
 LENGTH = 4
-ANSWERED, STOPPED = "#1b7837", "#b2182b"
+RESOLVED, STOPPED = BLUE, ORANGE
 
 
 def path(camera, origin, direction, t_end):
@@ -27,45 +29,42 @@ def path(camera, origin, direction, t_end):
     keep = (x >= 0) & (x < SIZE[0]) & (y >= 0) & (y < SIZE[1]) & (depth > 0)
     x, y, depth = x[keep], y[keep], depth[keep]
     along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
-    return x.astype(int), y.astype(int), along, depth
+    # Of each pixel the first and the last point are enough.
+    x, y = x.astype(int), y.astype(int)
+    changes = (np.diff(x) != 0) | (np.diff(y) != 0)
+    ends = np.concatenate([[True], changes]) | np.concatenate([changes, [True]])
+    return x[ends], y[ends], along[ends], depth[ends]
 
 
-def draw(axes, gbuffer, rays, marched, i, reference):
+def draw(axes, gbuffer, lists, rays, marched, i, reference):
     """Draw one ray's depth over the bounds of the pixels that it crosses."""
-    lists = gbuffer.lists
     t_hit = float(reference.t[i])
     px, py, along, depth = path(gbuffer.camera, rays.origin[i], rays.direction[i], t_hit * 1.15)
     bounds = lists.nearest[py, px]
     own = rays.pixel[i]
     axes.fill_between(
-        along, 0, lists.rest[py, px], color="0.75", lw=0, label="everything that is not listed"
+        along, 0, lists.rest[py, px], color=PALE, lw=0, label="all that is not listed"
     )
     for k in range(LENGTH):
         shown = np.where(bounds[:, k] > 0, bounds[:, k], np.nan)
-        axes.plot(
-            along,
-            shown,
-            color=plt.cm.Blues(0.95 - 0.18 * k),
-            lw=1.2,
-            label="bounds of the listed primitives" if k == 0 else None,
-        )
-    colour = ANSWERED if marched.resolved[i] else STOPPED
-    axes.plot(along, depth, color=colour, lw=2, label="the ray")
+        axes.plot(along, shown, color=AMBER, alpha=1 - 0.2 * k, lw=1.2,
+                  label="bounds of the listed primitives")  # fmt: skip
+    resolved = bool(marched.resolved[i])
+    colour = RESOLVED if resolved else STOPPED
+    ray = "a resolved ray" if resolved else "an unresolved ray"
+    axes.plot(along, depth, "-" if resolved else "--", color=colour, lw=2.2, label=ray)
     hit = hrt.project(gbuffer.camera, hits_point(rays, i, t_hit)[None])[0]
     place = along[np.argmin(np.hypot(px + 0.5 - hit[0], py + 0.5 - hit[1]))]
-    axes.plot([place], [hit[2]], "o", color=colour, ms=7, zorder=5, ls="", label="its true hit")
+    axes.plot([place], [hit[2]], "o", color="black", ms=7, zorder=5, label="its true hit")
     stop = hrt.project(gbuffer.camera, hits_point(rays, i, float(marched.t_free[i]))[None])[0]
-    said = (
-        "answered: nothing unlisted reaches the ray before its hit"
-        if marched.resolved[i]
-        else "handed over at the dotted line: what is not listed may be in the way"
-    )
-    axes.set_title(f"pixel ({own[0]}, {own[1]}), {said}", fontsize=9, loc="left")
-    if not marched.resolved[i]:
+    said = "nothing unlisted reaches the ray before its hit"
+    if not resolved:
+        said = "what is not listed may be in the way from the dotted line on"
         where = along[np.argmin(np.hypot(px + 0.5 - stop[0], py + 0.5 - stop[1]))]
-        axes.axvline(where, color=colour, ls=":", lw=1)
+        axes.axvline(where, color="black", ls=":", lw=1.4, label="where it is handed over")
+    title(axes, f"Pixel ({own[0]}, {own[1]}): {said}", 4.2)
     axes.set_xlim(0, along[-1])
-    axes.set_ylim(0, 1.25 * max(depth.max(), hit[2]))
+    axes.set_ylim(0, 1.1 * max(depth.max(), hit[2]))
     axes.set_xlabel("along the ray on the screen, pixels")
 
 
@@ -80,39 +79,42 @@ def pick(gbuffer, rays, marched, reference, wanted):
         px, _py, along, _depth = path(
             gbuffer.camera, rays.origin[i], rays.direction[i], float(reference.t[i])
         )
-        if len(px) > 100 and 25 < along[-1] < 60:
+        if len(px) > 40 and 25 < along[-1] < 60:
             return i
     raise SystemExit("no ray to show")
 
 
-def main():
-    """Write the figure."""
+def figure():
+    """Return the figure: a ray that the screen resolves beside one that it does not."""
     spec = hrs.get_scene("atrium")
     scene, camera = spec.load(), spec.camera("nave", *SIZE)
-    gbuffer = hrt.rasterize(scene, camera, lists=LENGTH)
-    pyramid = hrt.build_depth_pyramid(gbuffer, conservative=True)
+    gbuffer = hrt.rasterize(scene, camera)
     rays = hrt.mirror_rays(gbuffer)
-    marched = hrt.march(rays, gbuffer, pyramid, "certified")
+    screen = hrt.prepare(gbuffer, hrt.Certified(lists=LENGTH))
+    marched = hrt.march(rays, screen)
     reference = hrt.EmbreeTracer(scene, robust=True).intersect(rays)
-    figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
-    for panel, wanted in zip(
-        axes,
-        (marched.status == hrt.MarchStatus.HIT, marched.status == hrt.MarchStatus.HIDDEN),
-        strict=True,
-    ):
-        draw(
-            panel,
-            gbuffer,
-            rays,
-            marched,
-            pick(gbuffer, rays, marched, reference, wanted),
-            reference,
-        )
-    axes[0].set_ylabel("depth = near / z, nearer is higher")
-    axes[0].legend(loc="upper right", fontsize=8, frameon=False)
-    target = Path(__file__).with_suffix(".png")
-    figure.savefig(target, dpi=120)
-    print(f"wrote docs/figures/{target.name}")
+    with mpl.rc_context(STYLE):
+        made = Figure(figsize=(10.4, 4.6))
+        axes = panels(made, 2, 2)
+        found = {}
+        for panel, status in zip(axes, ("HIT", "HIDDEN"), strict=True):
+            wanted = marched.status == hrt.MarchStatus[status]
+            chosen = pick(gbuffer, rays, marched, reference, wanted)
+            draw(panel, gbuffer, screen.data.lists, rays, marched, chosen, reference)
+            for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+                found.setdefault(label, handle)
+        axes[0].set_ylabel("depth = near / z: nearer is higher")
+        legend(made, list(found.values()), list(found), fontsize=9)
+        footer(made, f"Mirror rays of atrium, camera nave, {SIZE[0]}×{SIZE[1]}; lists of "
+               f"{LENGTH} primitives per pixel.")  # fmt: skip
+    return made
+
+
+def main():
+    """Write the figure."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
+    for written in save(figure(), folder / "certified"):
+        print(f"wrote {written.name}")
 
 
 if __name__ == "__main__":

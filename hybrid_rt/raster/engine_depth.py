@@ -16,6 +16,8 @@ from hybrid_rt.kernels.arrays import F64, Bool
 KINDS = ("standard", "reversed", "linear", "distance")
 ORIGINS = ("top", "bottom")
 WHOLE_BITS = {np.dtype(np.uint16): 16, np.dtype(np.uint32): 32}
+FLOAT32 = 8 * 2.0**-24
+"""What a few operations in float32 round away, relative to their terms."""
 AT_NEAR = 0.9
 """A depth of the screen from which on a surface lies at the near plane."""
 OTHER = {"standard": "reversed", "reversed": "standard"}
@@ -31,10 +33,14 @@ class ScreenDepth:
         0 where there is nothing.
     uncertainty : (H, W) float64
         By how much each may be off: half of the step between numbers of the buffer, in `depth`.
+    arithmetic : float
+        By how much an engine that computes in float32 may be off before it stores a number, besides
+        what is relative to `depth`: standard buffers hold numbers near 1, and round as such.
     """
 
     depth: F64
     uncertainty: F64
+    arithmetic: float
 
 
 @dataclass(frozen=True)
@@ -136,7 +142,8 @@ def read(camera: Camera, depth: NDArray[Any], how: Form, background: Any = None)
         _not_the_other(screen[~empty], how)
     if how.bottom:
         screen, off = screen[::-1], off[::-1]
-    return ScreenDepth(np.ascontiguousarray(screen), np.ascontiguousarray(off))
+    arithmetic = FLOAT32 if how.kind == "standard" else 0.0
+    return ScreenDepth(np.ascontiguousarray(screen), np.ascontiguousarray(off), arithmetic)
 
 
 def _on_screen(camera: Camera, values: F64, half: F64, how: Form) -> tuple[F64, F64]:

@@ -11,7 +11,7 @@ from hybrid_rt import _check
 from hybrid_rt.camera.camera import Camera
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels.arrays import F64, I32, Bool
-from hybrid_rt.raster.engine_depth import ScreenDepth
+from hybrid_rt.raster.engine_depth import FLOAT32, ScreenDepth
 from hybrid_rt.raster.gbuffer import GBuffer
 from hybrid_rt.raster.rasterize import rasterize
 from hybrid_rt.rays.rays import Rays
@@ -19,8 +19,6 @@ from hybrid_rt.scene.mesh import Scene
 
 SUBPIXEL = 2.0**-8
 """To which a GPU rounds vertices on the screen, pixels: 8 bits, as Direct3D and Vulkan ask for."""
-ULPS = 8 * 2.0**-24
-"""Of a GPU's float32, by which its plane of a triangle may be off, relative to its terms."""
 LEAST_MATCHED = 0.5
 """Share of the pixels that a buffer must have in common with the mesh to be of it."""
 BESIDE = [(dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dx or dy]
@@ -117,8 +115,10 @@ class _Found:
         slope_x, slope_y = np.abs(ddx), np.abs(ddy)
         camera, off = self.camera, self.seen.uncertainty[y, x]
         terms = depth + camera.width * slope_x + camera.height * slope_y
-        # A value near 1 that a buffer of float32 holds was itself made of terms of that size.
-        return np.asarray(4.0 * off + SUBPIXEL * (slope_x + slope_y) + ULPS * terms)
+        # Twice: engines round to the nearest step or cut off what is below one.
+        return np.asarray(
+            2.0 * off + SUBPIXEL * (slope_x + slope_y) + FLOAT32 * terms + self.seen.arithmetic
+        )
 
     def trace(self, tracer: Any) -> None:
         """Look with rays that end at the buffer's depth, where nothing is found yet."""
@@ -126,7 +126,7 @@ class _Found:
         if len(x) == 0:
             return
         depth, off = self.seen.depth[y, x], self.seen.uncertainty[y, x]
-        around = 4.0 * off + 64.0 * ULPS * depth
+        around = 2.0 * off + 64.0 * FLOAT32 * depth + self.seen.arithmetic
         camera = self.camera
         origin, direction, nearest, farthest = camera.primary(x + 0.5, y + 0.5)
         start = camera.near if camera.parallel else 0.0  # where t is 0, along the view

@@ -159,6 +159,10 @@ class SceneSpec(_Strict):
     name, title, description : str
     needs : str
         What has to be supplied and where it comes from; empty for a scene generated from code.
+    mark, note : str
+        Where the triangles are not the model that the title names, or not all of it: a word or
+        three that every report writes after the scene's name, and the sentence that says what
+        they mean, without its full stop. Both empty for a scene that is whole.
     mesh : tuple of MeshSpec
         The meshes that make the scene, in the order of their `prim_id`.
     lights : LightsSpec, optional
@@ -170,6 +174,8 @@ class SceneSpec(_Strict):
     title: str
     description: str
     needs: str = ""
+    mark: Annotated[str, Field(max_length=24)] = ""
+    note: str = ""
     mesh: Annotated[tuple[MeshSpec, ...], Field(min_length=1)]
     lights: LightsSpec | None = None
     cameras: Annotated[dict[str, CameraSpec], Field(min_length=1)]
@@ -179,6 +185,12 @@ class SceneSpec(_Strict):
     def _needs_fit(self) -> SceneSpec:
         if bool(self.needs) == self.builtin:
             raise ValueError("'needs' must say where mesh files come from, if there are any")
+        return self
+
+    @model_validator(mode="after")
+    def _mark_fits(self) -> SceneSpec:
+        if bool(self.mark) != bool(self.note):
+            raise ValueError("'mark' and 'note' go together")
         return self
 
     @property

@@ -52,8 +52,10 @@ def _scenes() -> None:
         state = "built in" if spec.builtin else "missing" if absent else "found"
         if absent:
             missing.append(absent)
-        named = Text.assemble(name, "\n", (state, "dim"))
-        rows.append((named, "\n".join(spec.cameras), spec.description))
+        mark = f", {spec.mark}" if spec.mark else ""
+        named = Text.assemble(name, "\n", (state + mark, "dim"))
+        note = f"\n{spec.mark}: {spec.note}" if spec.mark else ""
+        rows.append((named, "\n".join(spec.cameras), spec.description + note))
     _table("Scenes", ("scene", "cameras", "what it is"), rows)
     places = ", then in ".join(map(str, hrs.data_directories()))
     out.print(f"Mesh files of scenes are looked for in {places}", soft_wrap=True)

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import io
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-import matplotlib as mpl
 import numpy as np
 import psutil
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -19,27 +17,17 @@ import hybrid_rt as hrt
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt_bench.measure import shade
 from hybrid_rt_bench.measure.loaded import native_path
-from hybrid_rt_bench.report.style import hexadecimal, reduced
+from hybrid_rt_bench.report.looks import STATUSES, rgb
+from hybrid_rt_bench.report.sheet import Entry, Picture, Scale, pixels, reduced, sheet
 from hybrid_rt_bench.results.files import write_bytes
 
 U8 = NDArray[np.uint8]
 What = Literal["shaded", "depth", "normals", "status", "all"]
 PICTURES: tuple[What, ...] = ("shaded", "depth", "normals", "status", "all")
 
-BACKGROUND = (250, 240, 215)
-STATUS_COLOURS = {
-    hrt.MarchStatus.HIT: (240, 240, 240),
-    hrt.MarchStatus.MISS: (86, 180, 233),
-    hrt.MarchStatus.OFFSCREEN: (230, 159, 0),
-    hrt.MarchStatus.HIDDEN: (0, 92, 158),
-    hrt.MarchStatus.NEAR: (0, 158, 115),
-    hrt.MarchStatus.EXHAUSTED: (204, 121, 167),
-    hrt.MarchStatus.INVALID: (226, 26, 28),
-    hrt.MarchStatus.UNDECIDED: (120, 94, 60),
-    hrt.MarchStatus.SKIPPED: (60, 60, 60),
-}
+BACKGROUND = rgb(STATUSES[""])
 STATUS_WORDS = {
-    hrt.MarchStatus.HIT: "hit: answered",
+    hrt.MarchStatus.HIT: "hit: resolved",
     hrt.MarchStatus.MISS: "miss: in front of everything",
     hrt.MarchStatus.OFFSCREEN: "offscreen: leaves the image",
     hrt.MarchStatus.HIDDEN: "hidden: behind a surface",
@@ -54,6 +42,13 @@ BYTES_A_PIXEL: dict[What, int] = {
 }  # fmt: skip
 """What a picture takes at its most, G-buffer and rays too: measured at 2560x1440, rounded up."""
 
+NORMALS = "normals, turned to the viewer: x, y, z from −1 to 1 as red, green, blue"
+AXES = (
+    ("#FF8080", "+x"), ("#80FF80", "+y"), ("#8080FF", "+z"),
+    ("#008080", "−x"), ("#800080", "−y"), ("#808000", "−z"),
+)  # fmt: skip
+"""The colours of normals along the axes."""
+
 SHEET = 960
 """Width of a picture on a contact sheet."""
 
@@ -66,7 +61,8 @@ def render(scene: hrt.Scene, camera: hrt.Camera, what: What, threads: int | None
     scene : Scene
     camera : Camera
     what : {"shaded", "depth", "normals", "status", "all"}
-        "all" is a contact sheet of the others with captions.
+        "all" is a contact sheet of the others with captions. Where colours mean something, the
+        picture stands over a legend or a scale.
     threads : int, optional
 
     Returns
@@ -76,42 +72,57 @@ def render(scene: hrt.Scene, camera: hrt.Camera, what: What, threads: int | None
     gbuffer = hrt.rasterize(scene, camera, threads=threads)
     kinds = ("shaded", "depth", "normals", "status") if what == "all" else (what,)
     rays = hrt.mirror_rays(gbuffer)
-    images: dict[str, U8] = {}
-    status: NDArray[np.uint8] | None = None
+    made: dict[str, Picture] = {}
+    entries: list[Entry] = []
     for kind in kinds:
         if kind == "shaded":
             tracer = hrt.EmbreeTracer(scene, threads=threads, path=native_path())
-            images[kind] = shade.shaded(gbuffer, rays, tracer, samples=16)
+            made[kind] = Picture(shade.shaded(gbuffer, rays, tracer, samples=16))
         elif kind == "depth":
-            images[kind] = depth_image(gbuffer)
+            made[kind] = Picture(*depth_picture(gbuffer))
         elif kind == "normals":
-            images[kind] = normals_image(gbuffer)
+            made[kind] = Picture(normals_image(gbuffer), NORMALS)
+            entries += AXES if what == "normals" else ()
         else:
             screen = hrt.prepare(gbuffer, "paper", threads=threads)
             status = hrt.march(rays, screen, threads=threads).status
-            images[kind] = status_image(gbuffer, rays, status)
+            caption = "how the march of each mirror ray ended, technique paper"
+            made[kind] = Picture(status_image(gbuffer, rays, status), caption)
+            entries += status_entries(status)
+    if what == "shaded":
+        return made[what].image
+    if (gbuffer.prim_id < 0).any() and what != "all":
+        entries.append((STATUSES[""], "no surface"))
+    title = ""
     if what == "all":
-        return _contact_sheet(scene, images, status)
-    if status is not None:
-        return _with_legend(images["status"], status)
-    return images[what]
+        title = f"{scene.name}, {len(scene):,} triangles"
+        made = {k: replace(p, image=reduced(p.image, SHEET)) for k, p in made.items()}
+        entries.append((STATUSES[""], "no surface"))
+    return pixels(sheet(list(made.values()), columns=2, title=title, legend=entries))
 
 
-def depth_image(gbuffer: hrt.GBuffer) -> U8:
-    """Return the distance, near bright and far dark on a logarithmic scale; cream where none.
+def depth_picture(gbuffer: hrt.GBuffer) -> tuple[U8, str, Scale | None]:
+    """Return distances in colours, a caption where there is none, and their scale.
 
-    Of parallel lines of sight the scale is linear, as their depth is. The ends of the scale are the
-    1st and 99th percentile of the distances in view.
+    Near is bright and far dark, between the 1st and the 99th percentile of the distances in view,
+    on a logarithmic scale, or a linear one where lines of sight are parallel; white where there is
+    no surface. No scale where nothing is in view.
     """
     covered = gbuffer.prim_id >= 0
     image = np.full((*covered.shape, 3), BACKGROUND, np.uint8)
-    if covered.any():
-        depth = gbuffer.depth[covered]
-        scale = depth if gbuffer.camera.parallel else np.log(depth)
-        low, high = np.quantile(scale, [0.01, 0.99])
-        scaled = np.clip((scale - low) / max(high - low, 1e-6), 0, 1)
-        image[covered] = (255 * mpl.colormaps["cividis"](scaled)[:, :3]).astype(np.uint8)
-    return image
+    if not covered.any():
+        return image, "depth: no surface is in view", None
+    camera = gbuffer.camera
+    z = camera.z_view(gbuffer.depth[covered])
+    low, high = (float(end) for end in np.quantile(z, [0.01, 0.99]))
+    if high - low <= 1e-3 * abs(high):  # one distance: a scale about it
+        about = 0.01 * abs(high) or 0.01
+        low, high = low - about, high + about
+    label = "distance along the view axis, z, in the scene's units"
+    # Between planes of parallel sight distances may be below zero, and nothing is far off.
+    scale = Scale(label, low, high, "cividis_r", logarithmic=not camera.parallel)
+    image[covered] = scale.painted(z)
+    return image, "", scale
 
 
 def normals_image(gbuffer: hrt.GBuffer) -> U8:
@@ -122,13 +133,21 @@ def normals_image(gbuffer: hrt.GBuffer) -> U8:
 
 
 def status_image(gbuffer: hrt.GBuffer, rays: hrt.Rays, status: NDArray[np.uint8]) -> U8:
-    """Return the status of every mirror ray at the pixel that it starts from."""
-    palette = np.array([STATUS_COLOURS[s] for s in hrt.MarchStatus], np.uint8)
+    """Return the status of every mirror ray, in its colour, at the pixel that it starts from."""
+    palette = np.array([rgb(STATUSES[s.name]) for s in hrt.MarchStatus], np.uint8)
     image = np.full((*gbuffer.prim_id.shape, 3), BACKGROUND, np.uint8)
-    light = 0.72 + 0.28 * np.abs(shade.normals(gbuffer) @ shade.SUN)
-    x, y = rays.pixel[:, 0], rays.pixel[:, 1]
-    image[y, x] = (palette[status] * light[y, x, None]).astype(np.uint8)
+    image[rays.pixel[:, 1], rays.pixel[:, 0]] = palette[status]
     return image
+
+
+def status_entries(status: NDArray[np.uint8]) -> list[Entry]:
+    """Return the colour and the share of each status that there is."""
+    counts = [(s, int(np.count_nonzero(status == s))) for s in hrt.MarchStatus]
+    return [
+        (STATUSES[s.name], f"{STATUS_WORDS[s]} ({100 * count / len(status):.1f} %)")
+        for s, count in counts
+        if count
+    ]
 
 
 def check_memory(width: int, height: int, what: What) -> None:
@@ -172,71 +191,3 @@ def check_output(path: Path) -> None:
         raise ArgumentError("output", "a file in an existing folder", repr(str(path)))
     if not os.access(folder, os.W_OK):
         raise ArgumentError("output", "a file in a folder that can be written to", repr(str(path)))
-
-
-def _with_legend(image: U8, status: NDArray[np.uint8]) -> U8:
-    height, width = image.shape[:2]
-    foot = max(60, round(width * 0.075))
-    figure = Figure(figsize=(width / 100, (height + foot) / 100), dpi=100)
-    ax = figure.add_axes((0, foot / (height + foot), 1, height / (height + foot)))
-    ax.imshow(image, interpolation="nearest", aspect="auto")
-    ax.set_axis_off()
-    figure.legend(
-        handles=_status_patches(status), loc="lower center", ncols=3, frameon=False,
-        fontsize=max(6.0, min(13.0, width / 90)), borderpad=0.2,
-    )  # fmt: skip
-    return _pixels(figure)
-
-
-def _status_patches(status: NDArray[np.uint8]) -> list[Patch]:
-    patches = []
-    for s in hrt.MarchStatus:
-        count = int(np.count_nonzero(status == s))
-        if count:
-            share = 100 * count / len(status)
-            colour = hexadecimal(STATUS_COLOURS[s])
-            label = f"{STATUS_WORDS[s]} ({share:.1f} %)"
-            patches.append(Patch(facecolor=colour, edgecolor="#777777", lw=0.5, label=label))
-    patches.append(
-        Patch(facecolor=hexadecimal(BACKGROUND), edgecolor="#777777", lw=0.5, label="no surface")
-    )
-    return patches
-
-
-def _contact_sheet(scene: hrt.Scene, images: dict[str, U8], status: NDArray[np.uint8] | None) -> U8:
-    small = {kind: reduced(image, SHEET) for kind, image in images.items()}
-    height, width = next(iter(small.values())).shape[:2]
-    caption, gap, foot = 30, 10, max(60, round(width * 0.07))
-    total_w = 2 * width + gap
-    total_h = 2 * (height + caption) + foot
-    figure = Figure(figsize=(total_w / 100, total_h / 100), dpi=100)
-    words = {
-        "shaded": f"{scene.name}, {len(scene):,} triangles",
-        "depth": "distance: bright near, dark far (logarithmic)",
-        "normals": "normals, turned to the viewer",
-        "status": "how the march of each mirror ray ended",
-    }
-    for number, (kind, image) in enumerate(small.items()):
-        x = (number % 2) * (width + gap)
-        top = (number // 2) * (height + caption)
-        ax = figure.add_axes(
-            (x / total_w, 1 - (top + height) / total_h, width / total_w, height / total_h)
-        )
-        ax.imshow(image, interpolation="nearest", aspect="auto")
-        ax.set_axis_off()
-        figure.text(
-            (x + 6) / total_w, 1 - (top + height + 5) / total_h, words[kind], va="top",
-            fontsize=max(6.0, min(12.0, width / 60)),
-        )  # fmt: skip
-    if status is not None:
-        figure.legend(
-            handles=_status_patches(status), loc="lower center", ncols=4, frameon=False,
-            fontsize=max(5.0, min(11.0, width / 70)), borderpad=0.2,
-        )  # fmt: skip
-    return _pixels(figure)
-
-
-def _pixels(figure: Figure) -> U8:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=100)
-    return np.asarray(Image.open(buffer).convert("RGB"))

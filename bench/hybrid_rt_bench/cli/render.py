@@ -54,9 +54,9 @@ def render(
 
     * `shaded` - sun, sky and shadows on bare geometry
 
-    * `depth` - distance on a logarithmic scale
+    * `depth` - distance along the view axis, with its logarithmic scale
 
-    * `normals` - turned to the viewer
+    * `normals` - turned to the viewer, with a legend
 
     * `status` - how the march of every mirror ray ended, with a legend
 

@@ -70,7 +70,7 @@ def run(
 
     * `hybrid-rt run peers --quick` - the same rays and pictures through other programs
 
-    * `hybrid-rt run roofline --quick` - what the certified march reads, takes and may take
+    * `hybrid-rt run roofline --quick` - what the certified march takes, and its break-even
     """
     from hybrid_rt_bench.experiments import load_experiment
 
@@ -94,11 +94,12 @@ def run(
         "broken": list(outcome.broken),
     }
     if outcome.measured:
-        from hybrid_rt_bench.runs import read_run
+        from hybrid_rt_bench.runs import read_run, verdict_of
 
         data = read_run(outcome.folder, out_dir)
         written = rendered(data, show=not as_json)
         summary |= {
+            "verdict": verdict_of(data),
             "notes": data.meta["notes"],
             "warnings": data.meta["warnings"],
             "results": _records(data),

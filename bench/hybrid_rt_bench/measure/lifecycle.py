@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numba
 
 import hybrid_rt as hrt
+import hybrid_rt_scenes as hrs
 from hybrid_rt_bench.measure import compiling, memory
 from hybrid_rt_bench.measure import environment as env
 from hybrid_rt_bench.measure.errors import reason_of
@@ -109,10 +110,8 @@ class Session:
         """Note in the run a scene that was loaded, and what its structures took to build."""
         self.writer.meta["scenes"].append(
             {
-                "name": planned.name,
-                "title": planned.spec.title,
+                **described(planned.spec, planned.name),
                 "row": planned.row,
-                "builtin": planned.spec.builtin,
                 "triangles": len(scene),
                 "zero_area": scene.zero_area,
                 "build_seconds": build_seconds,
@@ -283,6 +282,17 @@ def carry_out(
             writer.finish()
     interrupted = bool(writer.meta["interrupted"])
     return Outcome(writer.folder, writer.measured, len(writer.failed), interrupted)
+
+
+def described(spec: hrs.SceneSpec, name: str) -> dict[str, Any]:
+    """Return what a run says of a scene, called `name` in its results, before it is loaded."""
+    return {
+        "name": name,
+        "title": spec.title,
+        "builtin": spec.builtin,
+        "mark": spec.mark,
+        "note": spec.note,
+    }
 
 
 def cell_keys(scene: str, camera: str, resolution: Resolution | None) -> dict[str, Any]:

@@ -21,7 +21,7 @@ class PlannedScene:
     ----------
     spec : SceneSpec
     row : str
-        The row of the paper's tables that it stands beside.
+        The row of the paper's tables that it stands beside; empty for one that stands in.
     cameras : tuple of str
     size : int or None
         Triangles asked of a built-in scene.
@@ -100,7 +100,9 @@ def make_plan(
             if given:
                 spec = _with_cameras(spec, given)
             names = _camera_names(entry, spec, experiment, cameras)
-            planned = PlannedScene(spec, entry.row, names, entry.size)
+            # What stands in for a scene of the paper is not to be held against the paper.
+            row = entry.row if spec.name == entry.name else ""
+            planned = PlannedScene(spec, row, names, entry.size)
             if planned.name in [scene.name for scene in plan.scenes]:  # it stands in for two
                 plan.notes.append(f"scene {planned.name!r} is measured only once")
             else:

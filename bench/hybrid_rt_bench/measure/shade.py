@@ -15,6 +15,8 @@ COOL, WARM = np.array([0.96, 1.0, 1.06], np.float32), np.array([1.0, 0.95, 0.84]
 X, Y = np.array([1, 0, 0], np.float32), np.array([0, 1, 0], np.float32)
 SKY = np.array([0.62, 0.76, 0.93], np.float32)
 """Colour of the background, brighter towards the top."""
+EXPOSURE = np.float32(0.8)
+"""How much of the light a picture takes."""
 PATTERN = 4
 """Occlusion rays differ inside squares of this many pixels, and are averaged over as many."""
 
@@ -26,14 +28,7 @@ def normals(gbuffer: hrt.GBuffer) -> F32:
     -------
     (H, W, 3) float32, world
     """
-    covered = gbuffer.prim_id >= 0
-    out = np.zeros((*gbuffer.prim_id.shape, 3), np.float32)
-    scene = gbuffer.known_scene
-    corners = scene.vertices[scene.faces[gbuffer.prim_id[covered]]]
-    n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    away = gbuffer.camera.towards(corners[:, 0].astype(np.float64)).astype(np.float32)
-    out[covered] = _facing(n, -away)
-    return out
+    return np.nan_to_num(gbuffer.normal, nan=0.0).astype(np.float32)
 
 
 def shaded(gbuffer: hrt.GBuffer, rays: hrt.Rays, tracer: hrt.EmbreeTracer, samples: int = 8) -> U8:
@@ -70,7 +65,7 @@ def shaded(gbuffer: hrt.GBuffer, rays: hrt.Rays, tracer: hrt.EmbreeTracer, sampl
         sun = (0.66 * lit)[:, None]
         tint = _tints(gbuffer.known_scene.object_id[gbuffer.prim_id[y, x]])
         image[y, x] = tint * (ambient * COOL + sun * WARM)
-    return _srgb(image)
+    return _developed(image)
 
 
 def reflected_grey(rays: hrt.Rays, hits: hrt.Hits) -> F32:
@@ -110,7 +105,7 @@ def reflection(gbuffer: hrt.GBuffer, rays: hrt.Rays, hits: hrt.Hits) -> F32:
     brightness *= 1 + 0.1 * wave.mean(axis=1)
     light[met] = _tints(scene.object_id[hits.prim_id[met]]) * brightness[:, None]
     image = np.full((*gbuffer.prim_id.shape, 3), 0.5, np.float32)
-    image[rays.pixel[:, 1], rays.pixel[:, 0]] = np.clip(light, 0, 1) ** np.float32(1 / 2.2)
+    image[rays.pixel[:, 1], rays.pixel[:, 0]] = srgb(np.clip(light, 0, 1))
     return image
 
 
@@ -186,7 +181,23 @@ def _tints(object_id: NDArray[np.int32]) -> F32:
     return np.asarray(lightness[:, None] * (1 + 0.05 * np.cos(angle)), np.float32)
 
 
-def _srgb(linear: F32) -> U8:
-    x = np.clip(linear, 0, None)
+def srgb(linear: F32) -> F32:
+    """Return light as sRGB says it, by the curve of IEC 61966-2-1 in its two pieces.
+
+    Parameters
+    ----------
+    linear : array of float32, 0 to 1
+
+    Returns
+    -------
+    array of float32, 0 to 1
+    """
+    curve = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
+    return np.asarray(np.where(linear <= 0.0031308, 12.92 * linear, curve), np.float32)
+
+
+def _developed(linear: F32) -> U8:
+    """Return light of any strength as bytes in sRGB."""
+    x = EXPOSURE * np.clip(linear, 0, None)
     x = x / (1 + 0.25 * x)  # rolls off what the sun overexposes
-    return np.asarray(np.round(255 * np.clip(x, 0, 1) ** (1 / 1.8)), np.uint8)
+    return np.asarray(np.round(255 * srgb(np.clip(x, 0, 1))), np.uint8)

@@ -115,7 +115,8 @@ def test_tables_and_figures_are_written(finished):
     for title in ("Table 1.", "Table 2.", "Table 3.", "Alpha", "Errors", "Raster against"):
         assert f"### {title}" in text
     figures = {p.name for p in (folder / "figures").iterdir()}
-    assert {"paper-sphere-front.png", "paper-sphere-low.png", "alpha-by-camera.png"} <= figures
+    for name in ("paper-sphere-front", "paper-sphere-low", "alpha-by-camera"):
+        assert {f"{name}.png", f"{name}.svg"} <= figures
 
 
 def test_report_renders_an_old_run_and_compare_compares_it(finished, monkeypatch, capsys):
@@ -162,7 +163,7 @@ def test_ctrl_c_keeps_finished_cells(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("what", ["status", "all"])
+@pytest.mark.parametrize("what", ["status", "depth", "normals", "all"])
 def test_render_writes_a_picture(tmp_path, what):
     path = tmp_path / "x.png"
     done = shell(
@@ -170,7 +171,8 @@ def test_render_writes_a_picture(tmp_path, what):
     )
     assert done.returncode == 0, done.stderr
     image = Image.open(path)
-    assert image.width == (320 if what == "status" else 650)
+    assert image.width == (652 if what == "all" else 320)
+    assert image.height > (180 if what != "all" else 360)  # a legend or a scale stands below
     assert len(set(image.convert("RGB").get_flattened_data())) > 100
 
 
@@ -188,7 +190,8 @@ def test_list_and_info_tell_what_is_there():
         "shadow_area",
     ):
         assert word in listed.stdout
-    for word in ("embree", "numba", "cpu"):
+    assert "with a stage: the sphere alone is the paper's" in " ".join(listed.stdout.split())
+    for word in ("embree", "numba", "cpu", "scenes"):
         assert word in told.stdout
 
 

@@ -94,8 +94,10 @@ def test_a_run_is_measured_kept_shown_again_and_compared(monkeypatch, capsys, tm
     for title in ("Growth from", "Exponents: time as a power of pixels", "Peak memory"):
         assert f"### {title}" in text
     assert {path.name for path in (folder / "figures").iterdir()} == {
-        "scaling-size.png", "scaling-picture.png", "scaling-cores.png", "memory.png"
-    }  # fmt: skip
+        f"{name}.{ending}"
+        for name in ("scaling-size", "scaling-picture", "scaling-cores", "memory")
+        for ending in ("png", "svg")
+    }
 
     (folder / "tables.md").unlink()
     code, out, _ = run(monkeypatch, capsys, "report", folder)

@@ -9,7 +9,6 @@ import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import hybrid_rt as hrt
 from hybrid_rt_bench.executors.processes import Worker, WorkerError
@@ -38,6 +37,7 @@ from hybrid_rt_bench.results import exponents
 from hybrid_rt_bench.results import folder as results
 from hybrid_rt_bench.runs import compare_runs, read_run, render_run
 from support.bench_rows import ENVIRONMENT
+from support.geometry import check
 
 GOOD = """
 schema = 1
@@ -535,7 +535,9 @@ def test_threads_are_shown_as_a_speed_up(tmp_path, monkeypatch):
 def test_a_report_is_rendered_from_the_files_alone(tmp_path):
     run = write_run(tmp_path)
     tables, written = render_run(run)
-    assert {path.name for path in written} == {"tables.md", "scaling-a.png", "memory.png"}
+    assert {path.name for path in written} == {
+        "tables.md", "scaling-a.png", "scaling-a.svg", "memory.png", "memory.svg"
+    }  # fmt: skip
     assert all(path.stat().st_size > 1000 for path in written)
     text = (run.folder / "tables.md").read_text()
     for table in tables:
@@ -570,35 +572,8 @@ def test_no_two_texts_of_a_figure_overlap(tmp_path, axis, sizes):
         figures = [scaling_figures.time_over_axis(run, "a")]
         if axis != "threads":
             figures.append(scaling_figures.memory(run))
-    for figure in figures:
-        boxes = drawn_texts(figure)
-        assert len(boxes) > 10
-        for k, (name, box) in enumerate(boxes):
-            assert figure.bbox.contains(*box.min), f"{name!r} is cut off"
-            assert figure.bbox.contains(*box.max), f"{name!r} is cut off"
-            for other, second in boxes[k + 1 :]:
-                assert not box.overlaps(second), f"{name!r} over {other!r}"
-
-
-def drawn_texts(figure):
-    """Return every text that is drawn with the rectangle that it takes, those at an angle apart."""
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    renderer = canvas.get_renderer()
-    texts = [*figure.texts, figure._supxlabel]
-    for ax in figure.axes:
-        texts += ax.texts
-        if ax.get_legend() is not None:
-            texts += ax.get_legend().get_texts()
-        if ax.axison:
-            texts += [ax.title, ax.xaxis.label, ax.yaxis.label]
-            # Those that are drawn: ticks beyond the limits have labels too.
-            texts += [t.label1 for axis in (ax.xaxis, ax.yaxis) for t in axis._update_ticks()]
-    return [
-        (text.get_text(), text.get_window_extent(renderer))
-        for text in dict.fromkeys(texts)
-        if text.get_visible() and text.get_text().strip() and text.get_rotation() % 90 == 0
-    ]
+        for figure in figures:
+            check(figure)
 
 
 def test_runs_are_compared_cell_by_cell(tmp_path):

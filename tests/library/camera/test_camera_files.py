@@ -1,6 +1,7 @@
 """Sets of cameras: what is written comes back exactly, what is wrong is named with its key."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hybrid_rt as hrt
+from support import ROOT
 from support.gltf import Gltf
 
 HEAD = 'kind = "cameras"\nschema = 1\n'
@@ -239,3 +241,12 @@ def test_what_cannot_be_saved(tmp_path):
         hrt.save_cameras(tmp_path / "views.json", {"a": camera})
     with pytest.raises(hrt.ArgumentError, match="a file that can be written"):
         hrt.save_cameras(tmp_path / "no" / "views.toml", {"a": camera})
+
+
+def test_the_documented_file_is_one(tmp_path):
+    page = (ROOT / "docs" / "frames.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+    found = hrt.load_cameras(written(tmp_path, example))
+    assert [type(camera) for camera in found.values()] == [
+        hrt.Pinhole, hrt.Orthographic, hrt.Pinhole
+    ]  # fmt: skip

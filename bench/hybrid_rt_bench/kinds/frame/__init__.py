@@ -14,6 +14,7 @@ register(
         run=".run:run_frame",
         schema=".columns:SCHEMA",
         tables=".tables:tables",
+        verdict=".verdict:verdict",
         figures=(".figures:figures",),
         options=(*FRAME, TECHNIQUES),
     )

@@ -1,7 +1,8 @@
-"""Plots of a run: plain, labelled, readable without colour vision."""
+"""Plots of a run of kind "paper": every technique in each, like compared with like."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,25 +10,39 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from matplotlib.patches import Patch
+from matplotlib.ticker import FixedLocator, NullLocator
 
 from hybrid_rt_bench.kinds.paper import published as paper
 from hybrid_rt_bench.kinds.paper import summary
 from hybrid_rt_bench.kinds.paper.tables import samples_of
-from hybrid_rt_bench.report.style import (
-    BLUE,
-    COLOURS,
-    GREEN,
+from hybrid_rt_bench.report.alike import MISSING, alike, gap
+from hybrid_rt_bench.report.looks import (
+    AMBER,
+    BLACK,
     GREY,
-    ORANGE,
-    PURPLE,
-    SKY,
+    STAGES,
+    TECHNIQUES,
+    Look,
+    looks,
+)
+from hybrid_rt_bench.report.style import (
     footer,
+    legend,
     ordered,
+    panels,
+    plain_log,
+    resolutions,
     save_all,
+    title,
+    told,
+    wrapped,
 )
 from hybrid_rt_bench.results import statistics as stats
 from hybrid_rt_bench.results.folder import RunData
+
+VIEW = ("scene", "camera", "width", "height")
+ALIKE = "Means are over the views that all techniques of a point have in common."
 
 
 def plots(run: RunData, folder: Path) -> list[Path]:
@@ -46,206 +61,308 @@ def plots(run: RunData, folder: Path) -> list[Path]:
 
 
 def time_over_resolution(run: RunData) -> Figure:
-    """Return the times of march, strongest Embree and hybrid over the number of pixels."""
-    results = _first_technique(run)
-    scenes = ordered(results.scene)
-    figure = Figure(figsize=(3.4 * len(scenes) + 0.8, 3.6))
-    axes = _row_of_axes(figure, len(scenes), sharey=True)
-    lines = (
-        ("march_ms", "march (SSRM)", GREEN, "^"),
-        ("embree_ms", "strongest Embree, every ray", ORANGE, "s"),
-        ("hybrid_ms", "hybrid, measured", BLUE, "o"),
-    )
+    """Return the times of Embree and of each technique's march and hybrid over the resolution."""
+    results = _sized(run.results)
+    same = alike(results, VIEW, ("scene", "size"))
+    scenes, look = ordered(results.scene), looks(ordered(results.technique))
+    columns = min(3, len(scenes))
+    figure = Figure(figsize=(max(6.0, 3.5 * columns + 0.6), 3.4 * -(-len(scenes) // columns) + 0.8))
+    axes = panels(figure, len(scenes), columns, sharey=True, sharex=True)
+    sizes = results.drop_duplicates("pixels").sort_values("pixels")
     for ax, scene in zip(axes, scenes, strict=True):
-        part = results[results.scene == scene]
-        groups = part.assign(megapixels=part.width * part.height / 1e6).groupby("megapixels")
-        for column, label, colour, marker in lines:
-            values = groups[column]
-            x = np.array(list(values.groups))
-            ax.plot(x, values.mean(), color=colour, marker=marker, ms=5, label=label)
-            if len(x) and (values.count() > 1).any():
-                ax.fill_between(x, values.min(), values.max(), color=colour, alpha=0.13, lw=0)
-        sizes = part.drop_duplicates(["width", "height"])
-        ticks = sizes.width * sizes.height / 1e6
-        names = dict(
-            zip(
-                ticks,
-                [f"{w}×{h}" for w, h in zip(sizes.width, sizes.height, strict=True)],
-                strict=True,
-            )
-        )
-        ax.set(title=scene, xscale="log", yscale="log", xlabel="resolution")
-        ax.xaxis.set_major_locator(FixedLocator(list(names)))
+        part = same[same.scene == scene]
+        # Embree is timed once a view, whatever the techniques.
+        once = part.drop_duplicates(list(VIEW))
+        _line(ax, once, "embree_ms", TECHNIQUES["embree"], "-", "strongest Embree, every ray")
+        for name, how in look.items():
+            mine = part[part.technique == name]
+            if mine.empty:
+                continue
+            _line(ax, mine, "hybrid_ms", how, "-", f"{name}: hybrid")
+            _line(ax, mine, "march_ms", how, ":", f"{name}: march alone")
+        ax.set(xscale="log", yscale="log")
+        ax.xaxis.set_major_locator(FixedLocator(sizes.pixels.tolist()))
         ax.xaxis.set_minor_locator(NullLocator())
-        ax.xaxis.set_major_formatter(
-            FuncFormatter(lambda x, _, n=names: n[min(n, key=lambda k: abs(k - x))])
-        )
-        ax.tick_params(axis="x", rotation=30)
-        ax.set_xlim(0.7 * min(names), 1.4 * max(names))
-        _plain_log(ax)
-    axes[0].set_ylabel("time, ms")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    footer(figure, "Line: mean over cameras; band: least to most.")
+        ax.set_xticks(sizes.pixels.tolist(), resolutions(sizes), rotation=35, ha="right",
+                      rotation_mode="anchor")  # fmt: skip
+        ax.set_xlim(0.75 * sizes.pixels.min(), 1.33 * sizes.pixels.max())
+        plain_log(ax)
+        title(ax, scene, 3.0)
+    figure.supylabel("time, ms", fontsize=10)
+    _common_legend(figure, axes)
+    footer(
+        figure,
+        f"Line: mean over cameras; band: least to most. {ALIKE} {told(run, results)}",
+        *_absent(results, same, ("scene", "size")),
+    )
     return figure
 
 
 def speedup_by_scene(run: RunData) -> Figure:
-    """Return the estimated and the measured speed-up by scene and resolution."""
-    technique = ordered(run.results.technique)[0]
-    series: dict[tuple[str, str], dict[str, list[Any]]] = {}
-    for row, samples in samples_of(run, technique):
-        group = series.setdefault(
-            (row.scene, f"{int(row.width)}×{int(row.height)}"),
-            {"estimated": [], "measured": [], "pyramid": []},
-        )
-        group["estimated"].append(summary.estimated_speedup(samples, row.alpha))
-        group["measured"].append(summary.measured_speedup(samples))
-        group["pyramid"].append(summary.measured_speedup(samples, with_pyramid=True))
-    keys = list(series)
-    figure = Figure(figsize=(max(6.6, 0.62 * len(keys) + 2.4), 4.2))
-    ax = figure.add_subplot()
-    kinds = (
-        ("estimated", "estimated (paper's formula)", ORANGE, "s", -0.22),
-        ("measured", "measured", BLUE, "o", 0.0),
-        ("pyramid", "measured, pyramid added", SKY, "^", 0.22),
-    )
-    for kind, label, colour, marker, shift in kinds:
-        means = [stats.geometric_mean_of_medians(series[key][kind]) for key in keys]
-        y = np.array([m.value for m in means])
-        error = np.abs(np.array([[m.low for m in means], [m.high for m in means]]) - y)
-        x = np.arange(len(keys)) + shift
-        ax.errorbar(x, y, error, fmt=marker, ms=6, color=colour, capsize=2, lw=1.2, label=label)
-    ax.axhline(1, color="black", lw=1)
-    ax.annotate(
-        "the hybrid wins above", (1, 1), xycoords=("axes fraction", "data"), xytext=(-2, 3),
-        textcoords="offset points", ha="right", va="bottom", fontsize=8, color=GREY,
+    """Return the estimated and the measured speed-up by scene and resolution, a panel each."""
+    results = _sized(run.results)
+    same = alike(results, VIEW, ("scene", "size"))
+    kept = set(zip(*(same[k] for k in (*VIEW, "technique")), strict=True))
+    look = looks(ordered(results.technique))
+    rows = _groups(results[["scene", "size"]].drop_duplicates())
+    columns = min(4, len(look))
+    lines = -(-len(look) // columns)
+    figure = Figure(
+        figsize=(1.6 + (5.0 if columns == 1 else 2.7) * columns,
+                 1.6 + lines * (0.5 + 0.27 * len(rows))),
     )  # fmt: skip
-    for k, scene in enumerate(ordered([key[0] for key in keys])):
-        places = [i for i, key in enumerate(keys) if key[0] == scene]
-        if k:
-            ax.axvline(places[0] - 0.5, color="#BBBBBB", lw=0.8)
-        ax.text(
-            float(np.mean(places)), 1.02, scene, transform=ax.get_xaxis_transform(), ha="center",
-            fontweight="bold",
-        )  # fmt: skip
-    ax.set_xticks(range(len(keys)), [key[1] for key in keys], rotation=35, ha="right")
-    ax.set_xlim(-0.6, len(keys) - 0.4)
-    low, high = ax.get_ylim()
-    ax.set_ylim(min(low, 0.9), max(high, 1.12))
-    ax.set_ylabel("T(Embree) / T(hybrid)")
-    ax.grid(axis="x", visible=False)
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    footer(figure, "Geometric mean over cameras, 95 % bootstrap interval over rounds.")
+    axes = panels(figure, len(look), columns, sharex=True, sharey=True)
+    kinds = (
+        ("estimated, by the paper's formula", AMBER, "s", 0.26),
+        ("measured", BLACK, "o", 0.0),
+        ("measured, pyramid added", GREY, "^", -0.26),
+    )
+    for ax, name in zip(axes, look, strict=True):
+        series: dict[tuple[str, str], list[list[Any]]] = {}
+        for row, samples in samples_of(run, name):
+            if (*(row[k] for k in VIEW), name) in kept:
+                group = series.setdefault((row.scene, _size(row)), [[], [], []])
+                group[0].append(summary.estimated_speedup(samples, row.alpha))
+                group[1].append(summary.measured_speedup(samples))
+                group[2].append(summary.measured_speedup(samples, with_pyramid=True))
+        for y, key in enumerate(rows):
+            if key[1] and key not in series:
+                ax.text(0.03, y, MISSING, transform=ax.get_yaxis_transform(), fontsize=8,
+                        color=GREY, va="center")  # fmt: skip
+            for values, (label, colour, marker, shift) in zip(
+                series.get(key, ()), kinds, strict=False
+            ):
+                mean = stats.geometric_mean_of_medians(values)
+                error = [[max(0, mean.value - mean.low)], [max(0, mean.high - mean.value)]]
+                ax.errorbar(mean.value, y - shift, xerr=error, fmt=marker, ms=5, color=colour,
+                            capsize=2, lw=1.2, label=label)  # fmt: skip
+        ax.axvline(1, color="black", lw=1, zorder=1)
+        _named_rows(ax, rows, 2.1)
+        title(ax, name, 2.3, fontweight="bold")
+        ax.set_xlabel("T(Embree) / T(hybrid)")
+    low, high = zip(*(ax.dataLim.intervalx for ax in axes), strict=True)
+    least, most = min(0.9, *low), max(1.1, *high)
+    axes[0].set_xlim(least - 0.08 * (most - least), most + 0.08 * (most - least))
+    _common_legend(figure, axes)
+    footer(
+        figure,
+        "Right of the line at 1 the hybrid is faster than the strongest Embree for every ray. "
+        "Geometric mean over cameras, 95 % bootstrap interval over rounds.",
+        ALIKE,
+        told(run, results),
+    )
     return figure
 
 
 def alpha_by_camera(run: RunData) -> Figure:
-    """Return the share of resolved rays of each camera, beside the paper's mean."""
-    rows = _largest(run)
-    figure = Figure(figsize=(6.6, 1.3 + 0.3 * len(rows)))
+    """Return the share of resolved rays of each camera and technique, beside the paper's mean."""
+    rows, views, look = _largest(run)
+    groups = _groups(views)
+    figure = Figure(figsize=(7.2, 1.7 + (0.22 + 0.05 * len(look)) * len(groups)))
     ax = figure.add_subplot()
-    scenes = ordered(rows.scene)
-    for k, (_, row) in enumerate(rows.iterrows()):
-        colour = COLOURS[scenes.index(row.scene) % len(COLOURS)]
-        ax.barh(k, row.alpha, color=colour, height=0.66)
-        ax.text(row.alpha + 0.006, k, f"{row.alpha:.3f}", va="center", fontsize=9)
-    ax.axvline(paper.ALPHA, color="black", lw=1, ls="--")
-    ax.text(
-        paper.ALPHA, 1.01, f"paper's mean {paper.ALPHA}", transform=ax.get_xaxis_transform(),
-        ha="center", va="bottom", fontsize=9,
-    )  # fmt: skip
-    ax.set_yticks(range(len(rows)), [f"{r.scene}, {r.camera}" for _, r in rows.iterrows()])
-    ax.invert_yaxis()
-    ax.grid(axis="y", visible=False)
-    ax.set_xlim(0, max(0.5, 1.12 * float(rows.alpha.max())))
-    ax.set_xlabel("alpha: share of mirror rays that the screen answers")
+    for y, key in enumerate(groups):
+        mine = rows[(rows.scene == key[0]) & (rows.camera == key[1])]
+        for k, (name, how) in enumerate(look.items()):
+            value = mine[mine.technique == name].alpha
+            if len(value) and key[1]:
+                at = y + _shift(k, len(look))
+                ax.plot([0, value.iloc[0]], [at, at], color=how.colour, lw=1.1, zorder=2)
+                ax.plot(value, [at], how.marker, color=how.colour, ms=6, label=name, zorder=3)
+                if len(look) == 1:
+                    ax.annotate(f"{value.iloc[0]:.3f}", (value.iloc[0], at), xytext=(7, 0),
+                                textcoords="offset points", va="center", fontsize=9)  # fmt: skip
+    ax.axvline(paper.ALPHA, color="black", lw=1, ls="--", zorder=1,
+               label=f"the paper's mean, {paper.ALPHA}")  # fmt: skip
+    _named_rows(ax, groups, 5.0)
+    ax.set_xlim(-0.012, max(0.5, 1.12 * float(rows.alpha.max())))
+    ax.set_xlabel("alpha: share of mirror rays that the screen resolves")
+    _common_legend(figure, [ax])
+    footer(figure, told(run, rows), *_lacking(rows, views, look))
     return figure
 
 
 def errors_by_camera(run: RunData) -> Figure:
     """Return the rates of false hits and other errors of each camera, with their intervals."""
-    rows = _largest(run)
-    figure = Figure(figsize=(6.6, 1.6 + 0.36 * len(rows)))
-    ax = figure.add_subplot()
-    kinds = (
-        ("false_hit", "false hit", ORANGE, "s"),
-        ("false_miss", "false miss", PURPLE, "D"),
-        ("wrong_primitive", "wrong primitive", BLUE, "o"),
-    )
-    for number, (kind, label, colour, marker) in enumerate(kinds):
-        value = 100 * rows[f"{kind}_rate"].to_numpy(float)
-        low, high = (100 * rows[f"{kind}_{end}"].to_numpy(float) for end in ("low", "high"))
-        ax.errorbar(
-            value, np.arange(len(rows)) + 0.2 * (number - 1),
-            xerr=np.clip([value - low, high - value], 0, None),
-            fmt=marker, color=colour, ms=5, lw=1.2, capsize=2, label=label,
-        )  # fmt: skip
-    # Linear about zero, then logarithmic: a rate of exactly zero stays in the picture.
-    ax.set_xscale("symlog", linthresh=0.01)
-    top = max(10.0, 1.5 * float(np.nanmax(100 * rows.wrong_primitive_rate.to_numpy(float))))
-    ax.set_xlim(-0.002, top)
-    ticks = [t for t in (0, 0.01, 0.1, 1, 10, 100) if t <= top]
-    ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
-    ax.xaxis.set_minor_locator(NullLocator())
-    ax.set_yticks(range(len(rows)), [f"{r.scene}, {r.camera}" for _, r in rows.iterrows()])
-    ax.set_ylim(len(rows) - 0.5, -0.5)
-    ax.set_xlabel("% of the rays that the screen answers")
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    rows, views, look = _largest(run)
+    groups = _groups(views)
+    figure = Figure(figsize=(10.4, 1.8 + (0.22 + 0.07 * len(look)) * len(groups)))
+    kinds = ("false_hit", "false_miss", "wrong_primitive")
+    axes = panels(figure, 3, 3, sharex=True, sharey=True)
+    most = float(np.nanmax(100 * rows[[f"{kind}_high" for kind in kinds]].to_numpy(float)))
+    for ax, kind in zip(axes, kinds, strict=True):
+        for y, key in enumerate(groups):
+            mine = rows[(rows.scene == key[0]) & (rows.camera == key[1])]
+            for k, (name, how) in enumerate(look.items()):
+                found = mine[mine.technique == name]
+                if found.empty or not key[1]:
+                    continue
+                value, low, high = (
+                    float(100 * found[f"{kind}_{end}"].iloc[0]) for end in ("rate", "low", "high")
+                )
+                if not np.isfinite(value):  # a screen without an answer has no rate
+                    continue
+                error = [[max(0.0, value - low)], [max(0.0, high - value)]]
+                ax.errorbar(value, y + _shift(k, len(look)), xerr=error, fmt=how.marker,
+                            color=how.colour, ms=5, lw=1.1, capsize=2, label=name)  # fmt: skip
+        # Linear about zero, then logarithmic: a rate of exactly zero stays in the picture.
+        ax.set_xscale("symlog", linthresh=0.01)
+        top = max(10.0, 1.5 * most)
+        ax.set_xlim(-0.003, top)
+        ticks = [t for t in (0, 0.01, 0.1, 1, 10, 100) if t <= top]
+        ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
+        ax.xaxis.set_minor_locator(NullLocator())
+        _named_rows(ax, groups, 2.4)
+        title(ax, kind.replace("_", " "), 2.4)
+    axes[1].set_xlabel("% of the rays that the screen resolves")
+    _common_legend(figure, axes)
+    footer(figure, "95 % intervals; linear below 0.01 %.", told(run, rows),
+           *_lacking(rows, views, look))  # fmt: skip
     return figure
 
 
 def time_of_stages(run: RunData) -> Figure:
-    """Return where the time goes: tracing every ray beside the stages of the hybrid."""
-    rows = _largest(run)
-    figure = Figure(figsize=(7.2, 1.7 + 0.5 * len(rows)))
-    ax = figure.add_subplot()
-    parts = (
-        ("march_ms", "march", GREEN),
-        ("compaction_ms", "compaction", PURPLE),
-        ("fallback_ms", "fallback", "#E69F00"),
-        ("merge_ms", "merge", SKY),
-    )
-    for k, (_, row) in enumerate(rows.iterrows()):
-        scale = 1e6 / row.rays
-        ax.barh(k - 0.19, row.embree_ms * scale, 0.34, color=GREY, label="Embree, every ray")
-        left = 0.0
-        for column, label, colour in parts:
-            ax.barh(k + 0.19, row[column] * scale, 0.34, left=left, color=colour, label=label)
-            left += row[column] * scale
-    ax.set_yticks(range(len(rows)), [f"{r.scene}, {r.camera}" for _, r in rows.iterrows()])
-    ax.invert_yaxis()
-    ax.grid(axis="y", visible=False)
-    ax.set_xlabel("time a ray, ns (all threads together)")
-    handles, labels = ax.get_legend_handles_labels()
-    unique = dict(zip(labels, handles, strict=True))
-    figure.legend(
-        unique.values(), unique.keys(), loc="outside upper center", ncols=5, fontsize=9,
-        handlelength=1.2, columnspacing=1.4,
-    )  # fmt: skip
+    """Return where the time goes: tracing every ray beside the stages of each hybrid."""
+    rows, views, look = _largest(run)
+    scenes = ordered(views.scene)
+    columns = min(2, len(scenes))
+    each = 2 + len(look)  # a heading, Embree, the hybrids
+    most = max(sum(views.scene == scene) for scene in scenes)
+    lines = -(-len(scenes) // columns)
+    figure = Figure(figsize=(5.4 * columns + 1.0, 1.4 + lines * (0.55 + 0.19 * each * most)))
+    axes = panels(figure, len(scenes), columns, sharex=True)
+    parts = ("march", "compaction", "fallback", "merge")
+    for ax, scene in zip(axes, scenes, strict=True):
+        names: list[str] = []
+        for camera in ordered(views[views.scene == scene].camera):
+            mine = rows[(rows.scene == scene) & (rows.camera == camera)]
+            scale = 1e6 / mine.rays.iloc[0]
+            names += [camera, "Embree, every ray"]
+            ax.barh(len(names) - 1, mine.embree_ms.iloc[0] * scale, 0.72,
+                    color=STAGES["embree"].colour)  # fmt: skip
+            for name in look:
+                names.append(name)
+                found = mine[mine.technique == name]
+                if found.empty:
+                    gap(ax, 0.0, len(names) - 1.36, 0.22, 0.72, upright=False)
+                    continue
+                left = 0.0
+                for stage in parts:
+                    width = float(found[f"{stage}_ms"].iloc[0]) * scale
+                    ax.barh(len(names) - 1, width, 0.72, left=left, color=STAGES[stage].colour,
+                            hatch=STAGES[stage].hatch, edgecolor="white", lw=0)  # fmt: skip
+                    left += width
+        labels = [wrapped(name, 1.9, 8).replace("\n", " ") for name in names]
+        ax.set_yticks(range(len(names)), labels, fontsize=8)
+        for k, label in enumerate(ax.get_yticklabels()):
+            if k % each == 0:
+                label.set_fontweight("bold")
+        ax.tick_params(axis="y", length=0)
+        ax.set_ylim(len(names) - 0.4, -0.7)
+        ax.grid(axis="y", visible=False)
+        title(ax, scene, 4.0)
+        ax.set_xlabel("time per ray, ns")
+    handles = [
+        Patch(facecolor=how.colour, hatch=how.hatch, edgecolor="white", lw=0)
+        for how in STAGES.values()
+    ]
+    legend(figure, handles, ["Embree, every ray", *parts])
+    footer(figure, "Time of all threads together, a bar a technique.", told(run, rows))
     return figure
 
 
-def _first_technique(run: RunData) -> pd.DataFrame:
-    first = str(run.results.technique.iloc[0])
-    return run.results[run.results.technique == first]
+def _line(ax: Axes, rows: pd.DataFrame, column: str, how: Look, dash: str, label: str) -> None:
+    values = rows.groupby("pixels")[column]
+    x = np.array(list(values.groups))
+    ax.plot(x, values.mean(), dash, color=how.colour, marker=how.marker, ms=5, label=label,
+            markerfacecolor=how.colour if dash == "-" else "white")  # fmt: skip
+    if (values.count() > 1).any():
+        ax.fill_between(x, values.min(), values.max(), color=how.colour, alpha=0.12, lw=0)
 
 
-def _largest(run: RunData) -> pd.DataFrame:
-    rows = _first_technique(run)
-    rows = rows.assign(pixels=rows.width * rows.height)
+def _common_legend(figure: Figure, axes: Iterable[Axes]) -> None:
+    found: dict[str, Any] = {}
+    for ax in axes:
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    legend(figure, list(found.values()), list(found))
+
+
+def _groups(views: pd.DataFrame) -> list[tuple[str, str]]:
+    """Return the lines of a plot: a heading for each scene, its name and nothing, and its parts."""
+    lines = []
+    first, second = views.columns[:2]
+    for scene in ordered(views[first]):
+        parts = ordered(views[views[first] == scene][second])
+        lines += [(scene, ""), *((scene, part) for part in parts)]
+    return lines
+
+
+def _named_rows(ax: Axes, rows: Sequence[tuple[str, str]], inches: float) -> None:
+    """Name the lines at the left, and over them, in the first panel, their headings."""
+    if ax.get_subplotspec().is_first_col():  # type: ignore[union-attr]
+        ax.set_yticks(range(len(rows)), [part for _, part in rows])
+    ax.set_ylim(len(rows) - 0.4, -0.6)
+    ax.tick_params(axis="y", length=0)
+    ax.grid(axis="y", visible=False)
+    for y, (scene, part) in enumerate(rows):
+        if not part:
+            ax.axhline(y - 0.5, color="#D5D5D5", lw=0.7, zorder=0)
+            if ax.get_subplotspec().is_first_col():  # type: ignore[union-attr]
+                ax.text(0.01, y, wrapped(scene, inches, 9, "bold"), fontsize=9, fontweight="bold",
+                        transform=ax.get_yaxis_transform(), va="center", linespacing=1.0,
+                        bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
+                        zorder=4)  # fmt: skip
+
+
+def _shift(k: int, count: int) -> float:
+    """Return how far the k-th of several marks stands below the middle of its line."""
+    return 0.0 if count == 1 else 0.66 * (k / (count - 1) - 0.5)
+
+
+def _sized(rows: pd.DataFrame) -> pd.DataFrame:
+    return rows.assign(
+        pixels=rows.width * rows.height, size=[_size(row) for _, row in rows.iterrows()]
+    ).sort_values(["pixels"], kind="stable")
+
+
+def _size(row: Any) -> str:
+    return f"{int(row.width)}×{int(row.height)}"
+
+
+def _largest(run: RunData) -> tuple[pd.DataFrame, pd.DataFrame, dict[str, Look]]:
+    """Return the rows of each camera's largest resolution, its views and the techniques' looks."""
+    rows = run.results.assign(pixels=run.results.width * run.results.height)
     best = rows.groupby(["scene", "camera"]).pixels.transform("max")
-    return rows[rows.pixels == best]
+    views = rows[["scene", "camera"]].drop_duplicates()
+    return rows[rows.pixels == best], views, looks(ordered(rows.technique))
 
 
-def _row_of_axes(figure: Figure, count: int, *, sharey: bool) -> list[Axes]:
-    axes: list[Axes] = []
-    for k in range(count):
-        axes.append(figure.add_subplot(1, count, k + 1, sharey=axes[0] if sharey and k else None))
-    for ax in axes[1:]:
-        ax.tick_params(labelleft=not sharey)
-    return axes
+def _absent(rows: pd.DataFrame, same: pd.DataFrame, group: Sequence[str]) -> list[str]:
+    """Return a sentence that names what was not measured, or shares no view with the others."""
+    names = [*group, "technique"]
+    wanted = [
+        (*key, name)
+        for key in rows[list(group)].drop_duplicates().itertuples(index=False)
+        for name in ordered(rows.technique)
+    ]
+    found = set(same[names].drop_duplicates().itertuples(index=False, name=None))
+    return _sentence([", ".join(map(str, key)) for key in wanted if key not in found])
 
 
-def _plain_log(ax: Axes) -> None:
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
-    ax.yaxis.set_minor_formatter(FuncFormatter(lambda y, _: ""))
+def _lacking(
+    rows: pd.DataFrame, views: pd.DataFrame, techniques: Iterable[str]
+) -> list[str]:  # fmt: skip
+    """Return a sentence that names the techniques that a view was not measured with."""
+    found = set(rows[["scene", "camera", "technique"]].itertuples(index=False, name=None))
+    return _sentence(
+        [
+            f"{scene}, {camera}, {name}"
+            for scene, camera in views.itertuples(index=False, name=None)
+            for name in techniques
+            if (scene, camera, name) not in found
+        ]
+    )
+
+
+def _sentence(absent: Sequence[str]) -> list[str]:
+    return [f"Not measured: {'; '.join(absent)}."] if absent else []

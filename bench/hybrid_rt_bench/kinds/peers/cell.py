@@ -296,7 +296,7 @@ def _pair(
 
 
 def _timing_columns(rays: int, samples: list[Row]) -> Row:
-    """Return medians in milliseconds, and the median of the paired ratios of the times a ray."""
+    """Return medians in milliseconds, and the median of the paired ratios of the times per ray."""
     seconds = np.array([s["seconds"] for s in samples])
     other = np.array([s["beside"] / s["beside_rays"] for s in samples])
     middle = stats.median(1e3 * seconds)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from hybrid_rt_bench.kinds.peers import tables
-from hybrid_rt_bench.report.style import BLUE, GREY, ORANGE, footer, save_all
+from hybrid_rt_bench.report.looks import BLUE, GREY, ORANGE
+from hybrid_rt_bench.report.style import footer, legend, panels, save_all, title, told
 from hybrid_rt_bench.report.table import number
 from hybrid_rt_bench.results.folder import RunData
 
@@ -31,12 +32,12 @@ def rates(run: RunData) -> Figure:
     traced = tables.traced(run)
     names = [str(name) for name in dict.fromkeys(traced.technique)]
     scenes = list(tables.by_scene(traced))
-    figure = Figure(figsize=(2.2 + 4.2 * len(scenes), 1.5 + 0.42 * len(names)))
-    first = None
-    for k, (scene, part) in enumerate(scenes):
-        ax = figure.add_subplot(1, len(scenes), k + 1, sharey=first, sharex=first)
-        first = first or ax
-        for shift, (workload, colour, marker) in zip((-0.16, 0.16), LOOKS, strict=True):
+    columns = min(2, len(scenes))
+    lines = -(-len(scenes) // columns)
+    figure = Figure(figsize=(2.6 + 4.2 * columns, 1.3 + (0.8 + 0.42 * len(names)) * lines))
+    axes = panels(figure, len(scenes), columns, sharey=True, sharex=True)
+    for ax, (scene, part) in zip(axes, scenes, strict=True):
+        for shift, (workload, colour, marker) in zip((-0.18, 0.18), LOOKS, strict=True):
             for y, name in enumerate(names):
                 rows = part[part.technique == name]
                 value = tables.rate(tables.ok(rows[rows.workload == workload]))
@@ -45,7 +46,7 @@ def rates(run: RunData) -> Figure:
                     ax.annotate(
                         number(value), (value, y + shift), xytext=(6, 0), va="center",
                         textcoords="offset points", fontsize=8, color=colour, zorder=4,
-                        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
+                        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4},
                     )  # fmt: skip
         for y, name in enumerate(names):
             if tables.ok(part[part.technique == name]).empty:
@@ -58,24 +59,30 @@ def rates(run: RunData) -> Figure:
         )
         if np.isfinite(strongest):
             ax.axvline(strongest, color=BLUE, lw=0.9, ls="--", zorder=1)
-        ax.set(title=tables.scene_label(run, scene), xscale="log", xlabel="Mrays/s")
+        title(ax, tables.scene_label(run, scene), 3.9)
+        ax.set_xscale("log")
         ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
         ax.xaxis.set_minor_formatter(NullFormatter())
-        ax.set_yticks(range(len(names)), [_named(run, traced, name) for name in names])
-        ax.tick_params(axis="y", length=0, labelleft=k == 0)
-    assert first is not None
-    first.set_ylim(len(names) - 0.5, -0.5)
-    low, high = first.get_xlim()
-    first.set_xlim(low, 2.5 * high)  # room for the last number
-    handles = [
-        mpl.lines.Line2D([], [], color=colour, marker=marker, ls="", label=f"{workload} rays")
-        for workload, colour, marker in LOOKS
-    ]
-    figure.legend(handles=handles, loc="outside upper center", ncols=2)
-    footer(figure, f"Dashed: {names[0]}, mirror rays. {tables.views_text(run)}; 1 t, 2 t: threads.")
+        if ax.get_subplotspec().is_first_col():  # type: ignore[union-attr]
+            ax.set_yticks(range(len(names)), [_named(traced, name) for name in names])
+        ax.tick_params(axis="y", length=0)
+    for ax in axes[-columns:]:
+        ax.set_xlabel("Mrays/s")
+    axes[0].set_ylim(len(names) - 0.5, -0.5)
+    low, high = axes[0].get_xlim()
+    axes[0].set_xlim(low, 2.5 * high)  # room for the last number
+    handles = [Line2D([], [], color=colour, marker=marker, ls="") for _, colour, marker in LOOKS]
+    legend(figure, handles, [f"{workload} rays" for workload, *_ in LOOKS])
+    others = [str(name) for name in dict.fromkeys(run.results.technique) if name not in names]
+    footer(
+        figure,
+        f"Dashed: {names[0]}, mirror rays. 1 t, 2 t: threads.",
+        f"They trace no rays, see the tables: {', '.join(others)}." if others else "",
+        told(run, traced.drop(columns="threads")),
+    )
     return figure
 
 
-def _named(run: RunData, traced: pd.DataFrame, name: str) -> str:
+def _named(traced: pd.DataFrame, name: str) -> str:
     done = tables.ok(traced[traced.technique == name])
     return f"{name}, {int(done.threads.iloc[0])} t" if len(done) else name

@@ -14,7 +14,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
+from matplotlib.ticker import FixedLocator, NullLocator
 
 from hybrid_rt_bench.kinds.scaling.stages import (
     A_RAY,
@@ -28,27 +28,23 @@ from hybrid_rt_bench.kinds.scaling.tables import (
     series_names,
     stages_of,
 )
+from hybrid_rt_bench.report.looks import BLACK, GREY, SERIES, looks
 from hybrid_rt_bench.report.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    SKY,
     Draw,
+    columns_of,
     footer,
+    ordered,
+    plain_log,
     save_all,
+    told,
 )
 from hybrid_rt_bench.results.folder import RunData
 
-TECHNIQUE_COLOURS = (BLUE, GREEN, PURPLE, "#E69F00", SKY, "#000000")
-TECHNIQUE_MARKERS = ("o", "^", "D", "v", "P", "X")
-
 SHARED_LOOKS: dict[str, tuple[str, str]] = {
-    "embree": (ORANGE, "s"),
+    "embree": (BLACK, "*"),
     "brute_force": (GREY, "x"),
-    "build": (ORANGE, "s"),
-    "raster": (BLUE, "o"),
+    "build": (BLACK, "*"),
+    "raster": (GREY, "h"),
 }
 """Colour and marker of the stages that belong to no technique."""
 
@@ -68,6 +64,9 @@ GUIDES: dict[str, tuple[Guide, ...]] = {
 """Slopes to compare with, for each axis."""
 
 LONG_LABEL, MOST_LABELS = 7, 9
+
+PANEL, LEGEND = (5.7, 4.6), 8.5
+"""The size of a panel, inches, and that of the text of its legend, points."""
 
 LABEL_SHARE = 0.05
 """The height of a guide's name as a share of the height of a panel."""
@@ -103,22 +102,38 @@ def time_over_axis(run: RunData, name: str) -> Figure:
     part = of_series(run, name)
     axis = str(part.axis.iloc[0])
     # At a fixed view a time a ray says the same and can be held beside a sample of brute force.
-    column, unit = ("ns_per_ray", "ns a ray") if axis == "triangles" else ("ms", "ms")
+    column, unit = ("ns_per_ray", "ns per ray") if axis == "triangles" else ("ms", "ms")
     keys = stages_of(part)
     shown = ("embree", "brute_force", "march", "hybrid")
     left = [key for key in keys if key[1] in shown]
     if column == "ms":
         left = [key for key in left if key[1] != "brute_force"]
     right = [key for key in keys if key[1] not in A_RAY]
-    figure = Figure(figsize=(11.4, 6.0))
-    axes = _grid(figure, 2, max(len(left), len(right)))
     techniques = [t for t in dict.fromkeys(part.technique) if t != SHARED]
-    _panel(*axes[0], part, _lines(part, left, column, techniques), axis)
+    shown_lines = _lines(part, left, column, techniques), _lines(part, right, "ms", techniques)
+    figure, axes = _grid(shown_lines)
+    _panel(*axes[0], part, shown_lines[0], axis)
     _name(axes[0][0], "Answers to mirror rays", f"time, {unit}")
-    _panel(*axes[1], part, _lines(part, right, "ms", techniques), axis)
+    _panel(*axes[1], part, shown_lines[1], axis)
     _name(axes[1][0], "What is made before", "time, ms")
-    footer(figure, f"{name}: {fixed(part)}. Median of the rounds; band: its interval.")
+    footer(
+        figure,
+        f"{name}: {fixed(part)}. Median of the rounds; band: its interval.",
+        *_absent(part, techniques),
+        f"{run.meta['environment']['cpu']}.",
+    )
     return figure
+
+
+def _absent(part: pd.DataFrame, techniques: Sequence[str]) -> list[str]:
+    """Return a sentence that names the sizes at which a technique was not measured."""
+    lost = []
+    for technique in techniques:
+        mine = part[part.technique == technique]
+        labels = part[~part.x.isin(mine.x)].label
+        if len(labels):
+            lost.append(f"{technique} at {', '.join(ordered(labels))}")
+    return [f"Not measured: {'; '.join(lost)}."] if lost else []
 
 
 def _with_memory(run: RunData) -> dict[str, list[str]]:
@@ -135,41 +150,49 @@ def _with_memory(run: RunData) -> dict[str, list[str]]:
 def memory(run: RunData) -> Figure:
     """Return the peak memory over triangles and over pixels."""
     groups = _with_memory(run)
-    figure = Figure(figsize=(5.7 * len(groups) + 0.4, 5.4))
-    for (ax, beneath), (axis, names) in zip(
-        _grid(figure, len(groups), 2 * max(map(len, groups.values()))), groups.items(), strict=True
-    ):
-        lines = []
+    lines: dict[str, list[Line]] = {}
+    for axis, names in groups.items():
         for number, name in enumerate(names):
             part = of_series(run, name).drop_duplicates("x")
             part = part[part.peak_bytes > 0]
-            colour = TECHNIQUE_COLOURS[number % len(TECHNIQUE_COLOURS)]
-            marker = TECHNIQUE_MARKERS[number % len(TECHNIQUE_MARKERS)]
+            colour, marker, _ = SERIES[number % len(SERIES)]
             whole = part.peak_bytes.to_numpy(float) / 2**20
             rest = whole - part.program_bytes.to_numpy(float) / 2**20
-            for label, y, dash in (
-                (f"{name}: peak", whole, "-"),
-                (f"{name}: without the program", rest, "--"),
-            ):
+            for label, y, dash in ((name, whole, "-"), ("", rest, "--")):
                 x = part.x.to_numpy(float)
                 kept = y > 0
-                lines.append(Line(label, colour, marker, dash, x[kept], y[kept], y[kept], y[kept]))
-        _panel(ax, beneath, of_series(run, names[0]), lines, axis)
+                lines.setdefault(axis, []).append(
+                    Line(label, colour, marker, dash, x[kept], y[kept], y[kept], y[kept])
+                )
+    figure, axes = _grid(list(lines.values()))
+    for (ax, beneath), (axis, names) in zip(axes, groups.items(), strict=True):
+        _panel(ax, beneath, of_series(run, names[0]), lines[axis], axis)
         _name(ax, f"Over {axis}", "peak memory of the process, MiB")
+    every = run.results[run.results.series.isin([n for names in groups.values() for n in names])]
     footer(
         figure,
-        "Program: interpreter, libraries, compiled kernels. The rest: scene, Embree, images, rays.",
+        "Solid: all; dashed: without the program, which is interpreter, libraries and compiled "
+        "kernels. The rest: scene, Embree, images, rays of all techniques.",
+        told(run, every),
     )
     return figure
 
 
-def _grid(figure: Figure, count: int, most: int) -> list[tuple[Axes, Axes]]:
-    """Return panels side by side, each with a place beneath for a legend of up to `most` lines."""
+def _grid(legends: Sequence[Sequence[Line]]) -> tuple[Figure, list[tuple[Axes, Axes]]]:
+    """Return panels side by side, each with a place beneath that is as high as its legend."""
+    labels = [[line.label for line in lines if line.label] for lines in legends]
+    columns = [columns_of(of, PANEL[0] - 1.0, LEGEND) for of in labels]
+    most = max(-(-len(of) // count) for of, count in zip(labels, columns, strict=True))
+    beneath = 0.02 + 0.018 * LEGEND * most
+    figure = Figure(figsize=(PANEL[0] * len(legends) + 0.2, PANEL[1] + beneath + 0.6))
     engine = figure.get_layout_engine()
     assert isinstance(engine, ConstrainedLayoutEngine)
     engine.set(w_pad=0.14)  # room beside the names of guides
-    grid = figure.add_gridspec(2, count, height_ratios=(1.0, 0.02 + 0.055 * -(-most // 2)))
-    return [(figure.add_subplot(grid[0, k]), figure.add_subplot(grid[1, k])) for k in range(count)]
+    grid = figure.add_gridspec(2, len(legends), height_ratios=(PANEL[1], beneath))
+    return figure, [
+        (figure.add_subplot(grid[0, k]), figure.add_subplot(grid[1, k]))
+        for k in range(len(legends))
+    ]
 
 
 def _name(ax: Axes, title: str, y: str) -> None:
@@ -186,9 +209,7 @@ def _lines(
         if technique == SHARED:
             colour, marker = SHARED_LOOKS[stage]
         else:
-            number = techniques.index(technique)
-            colour = TECHNIQUE_COLOURS[number % len(TECHNIQUE_COLOURS)]
-            marker = TECHNIQUE_MARKERS[number % len(TECHNIQUE_MARKERS)]
+            colour, marker, _ = looks(techniques)[technique]
         y = rows[column].to_numpy(float)
         scale = y / rows.ms.to_numpy(float)
         lines.append(
@@ -211,7 +232,7 @@ def _panel(ax: Axes, beneath: Axes, part: pd.DataFrame, lines: Sequence[Line], a
     for line in lines:
         ax.plot(
             line.x, line.y, line.dash, color=line.colour, marker=line.marker, ms=5,
-            label=line.label, zorder=3,
+            label=line.label or "_", zorder=3,
             markerfacecolor="white" if line.dash == "--" else line.colour,
         )  # fmt: skip
         ax.fill_between(line.x, line.low, line.high, color=line.colour, alpha=0.13, lw=0)
@@ -226,10 +247,11 @@ def _panel(ax: Axes, beneath: Axes, part: pd.DataFrame, lines: Sequence[Line], a
     bottom, top = centre / math.sqrt(room) / 1.9, centre * math.sqrt(room) * 1.4
     ax.set_ylim(bottom, top)
     _guides(ax, axis, xs, bottom, top, low)
-    _plain(ax, top / bottom)
+    plain_log(ax)
     beneath.axis("off")
     beneath.legend(
-        *ax.get_legend_handles_labels(), loc="upper center", ncols=2, fontsize=8.5,
+        *ax.get_legend_handles_labels(), loc="upper center", fontsize=LEGEND,
+        ncols=columns_of([line.label for line in lines if line.label], PANEL[0] - 1.0, LEGEND),
         handlelength=2.6, borderaxespad=0,
     )  # fmt: skip
 
@@ -287,14 +309,3 @@ def _ticks(ax: Axes, axis: str, xs: np.ndarray[Any, Any], labels: list[str]) -> 
             text.set_horizontalalignment("right")
             text.set_rotation_mode("anchor")
     ax.set_xlim(xs.min() / 1.12, xs.max() * 1.12)
-
-
-def _plain(ax: Axes, span: float) -> None:
-    """Write numbers without exponents, and between the decades too where there are few."""
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:,.10g}"))
-    if span < 300:
-        ax.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
-        ax.yaxis.set_minor_formatter(FuncFormatter(lambda y, _: f"{y:,.10g}"))
-        ax.tick_params(axis="y", which="minor", labelsize=8.5)
-    else:
-        ax.yaxis.set_minor_formatter(FuncFormatter(lambda y, _: ""))
