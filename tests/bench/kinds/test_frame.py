@@ -116,7 +116,7 @@ def test_maps_show_each_ray_where_it_starts(drawn):
     hit = np.argwhere(status == hrt.MarchStatus.HIT)[0]
     assert tuple(image[tuple(hit)]) == (0xC8, 0xC8, 0xC8)
     assert (image[status == NOWHERE] == 255).all()
-    assert list(figures.STATUSES) == [s.name for s in hrt.MarchStatus]
+    assert [s.name for s in hrt.MarchStatus] == figures.NAMES
 
 
 def test_the_pictures_have_the_frames_pixels(run, dump):
