@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 JOBS ?= 2
 PYTEST := $(BIN)/pytest -n $(JOBS) --dist loadfile
 
-.PHONY: help report quick test lint types contracts fast unit mutation oldest fuzz corpus clean
+.PHONY: help report quick test lint types contracts fast unit mutation oldest fuzz corpus clean reference-runs results
 
 help:
 	@echo "make report     run the paper experiment in its quick form on the built-in scenes"
@@ -18,6 +18,8 @@ help:
 	@echo "make oldest     try everything once with the oldest dependencies that are allowed"
 	@echo "make fuzz       junk at every argument of the public API, and damaged mesh files, all of it"
 	@echo "make corpus COLLECTIONS='NAME=FOLDER ...'  compare mesh readers over public collections"
+	@echo "make reference-runs  measure what stands behind docs/results: 45 minutes on a quiet machine"
+	@echo "make results    render docs/results and the findings in README from the runs committed there"
 	@echo "make cold-start  seconds that the first picture waits for compilation"
 	@echo "make clean      remove .venv and caches"
 
@@ -61,6 +63,12 @@ fuzz: $(STAMP)
 corpus: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[test,corpus,draco,meshopt]"
 	$(BIN)/python tests/corpus/corpus.py $(COLLECTIONS)
+
+reference-runs: $(STAMP)
+	$(BIN)/python bench/reference_runs.py
+
+results: $(STAMP)
+	$(BIN)/python bench/docs_results.py
 
 clean:
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -12,6 +12,8 @@ from .camera.camera import project as project
 from .camera.camera import unproject as unproject
 from .camera.orthographic import Orthographic as Orthographic
 from .camera.pinhole import Pinhole as Pinhole
+from .camera_files import load_cameras as load_cameras
+from .camera_files import save_cameras as save_cameras
 from .compiling import Compiling as Compiling
 from .compiling import on_compile as on_compile
 from .errors import ArgumentError as ArgumentError

@@ -19,7 +19,7 @@ from typing import Any, ClassVar, NoReturn, Protocol, TypeVar
 from hybrid_rt import _check, _threads
 from hybrid_rt.camera.camera import Camera
 from hybrid_rt.errors import ArgumentError
-from hybrid_rt.kernels.arrays import Bool
+from hybrid_rt.kernels.arrays import I64, Bool
 from hybrid_rt.raster.gbuffer import GBuffer
 from hybrid_rt.rays.hits import Hits
 from hybrid_rt.rays.marched import Marched
@@ -139,8 +139,8 @@ class Screen:
 
     @property
     def scene(self) -> Scene:
-        """What is on the screen."""
-        return self.gbuffer.scene
+        """What is on the screen; refused by name where that is not known."""
+        return self.gbuffer.known_scene
 
     @property
     def camera(self) -> Camera:
@@ -170,10 +170,9 @@ class Screen:
 
     def __repr__(self) -> str:
         camera = self.camera
-        return (
-            f"<screen of {self.scene.name!r}, {camera.width} x {camera.height}, "
-            f"for {self.technique!r}>"
-        )
+        scene = self.gbuffer.scene
+        of = "a depth buffer alone" if scene is None else repr(scene.name)
+        return f"<screen of {of}, {camera.width} x {camera.height}, for {self.technique!r}>"
 
 
 @dataclass(frozen=True)
@@ -245,19 +244,42 @@ class Technique(abc.ABC):
         self, rays: Rays, screen: Screen, *, any_hit: bool = False, threads: int | None = None
     ) -> Marched:
         """Return what the screen says about each ray; as `hybrid_rt.march`."""
-        _check.instance("rays", rays, Rays)
-        _check.instance("screen", screen, Screen)
         any_hit = _check.boolean("any_hit", any_hit)
-        _threads.count(threads)
-        screen = screen.of(self)
-        check_rays(rays, screen.scene, screen.camera)
+        screen = self._checked(rays, screen, threads)
+        scene = screen.gbuffer.scene
         marched = self._march(rays, screen, any_hit, threads)
         if type(self).__module__.partition(".")[0] == __package__:
             return marched
         _check.instance(f"what {self.name!r} returns", marched, Marched)
         camera = screen.camera
-        size = len(rays), len(screen.scene), camera.width, camera.height
+        size = len(rays), 1 if scene is None else len(scene), camera.width, camera.height
         return marched._checked(f"what {self.name!r} returns", *size)
+
+    def steps_by_level(
+        self, rays: Rays, screen: Screen, *, threads: int | None = None
+    ) -> I64 | None:
+        """Return how many samples all rays take of each level of a pyramid.
+
+        Arguments and errors are those of `hybrid_rt.march`. The rays are marched once more, with
+        counters, which a march does without.
+
+        Returns
+        -------
+        (L,) int64, or None
+            Level 0 is the depth buffer, and all that a technique without a pyramid reads. None of a
+            technique that does not count them.
+        """
+        self._checked(rays, screen, threads)
+        return None
+
+    def _checked(self, rays: Rays, screen: Screen, threads: int | None) -> Screen:
+        """Return the screen as this technique's, or raise unless the arguments fit each other."""
+        _check.instance("rays", rays, Rays)
+        _check.instance("screen", screen, Screen)
+        _threads.count(threads)
+        screen = screen.of(self)
+        check_rays(rays, screen.gbuffer.scene, screen.camera)
+        return screen
 
     def _read(self, gbuffer: GBuffer, threads: int | None) -> Any:
         """Return what `march` needs besides the G-buffer; for a technique to override."""
@@ -348,10 +370,10 @@ def march(
 
     Notes
     -----
-    In "paper" free space is proven at pixel centres only, so 0.5 to 2 % of the answers are wrong by
-    more than a pixel (``hybrid-rt run paper`` measures the rate). "slope" proves it over whole
-    pixels, but only for the planes that the pixels show. "linear", "dda" and "hiz" guess a
-    thickness, and are wrong wherever it is; "hiz" also answers rays with a miss.
+    In "paper" free space is proven at pixel centres only, so a few answers are wrong by more than a
+    pixel (``hybrid-rt run paper`` measures their share). "slope" proves it over whole pixels, but
+    only for the planes that the pixels show. "linear", "dda" and "hiz" guess a thickness, and are
+    wrong wherever it is; "hiz" also answers rays with a miss.
 
     The same bits come out for any number of threads and any order of the rays. Directions of any
     length give the same answers: they are scaled by powers of two.
@@ -360,9 +382,12 @@ def march(
     return screen.technique.march(rays, screen, any_hit=any_hit, threads=threads)
 
 
-def check_rays(rays: Rays, scene: Scene, camera: Camera | None = None) -> None:
-    """Raise unless rays may be used with a scene, and with a view if one is given."""
-    if rays.scene is not None and not rays.scene.same_as(scene):
+def check_rays(rays: Rays, scene: Scene | None, camera: Camera | None = None) -> None:
+    """Raise unless rays may be used with a scene, and with a view if one is given.
+
+    Rays of any scene may be marched through a view of one that is not known.
+    """
+    if scene is not None and rays.scene is not None and not rays.scene.same_as(scene):
         raise ArgumentError(
             "rays",
             f"rays of scene {scene.name!r}, or of none (rays.detached())",

@@ -11,9 +11,10 @@ rounded outwards (`OffsetRayOrigin` in M. Pharr, W. Jakob and G. Humphreys, "Phy
 Rendering", 4th ed., section 6.8.6). The normal is the triangle's geometric one, turned to the
 viewer. `t_near` bounds the distance at which a float32 intersector can still report the triangle
 that the ray starts on, and is never larger than `t_far`. Neither is an absolute epsilon: both scale
-with the coordinates. Where the raster clamped the depth of a sliver seen edge-on (one pixel in 1e5
-of Sponza), the ray starts at the stored depth, which may lie behind the plane: such a ray may meet
-its own triangle.
+with the coordinates. Where the raster clamped the depth of a sliver seen edge-on, which is rare,
+the ray starts at the stored depth, which may lie behind the plane: such a ray may meet its own
+triangle. Of a depth buffer whose triangles are not known (`GBuffer.from_arrays`), it starts on the
+plane of its pixel in the same way; where buffer and scene disagree, no ray starts.
 
 No ray but a mirror ray of a surface seen exactly edge-on leaves below the surface or along it. A
 sample that would is left out; there is no ray for its pixel then.
@@ -195,10 +196,11 @@ def _surface_rays(
     """Return the rays of one kind; its parameters are those of the kernel `surface_rays`."""
     _check.instance("gbuffer", gbuffer, GBuffer)
     camera = gbuffer.camera
+    prim_id, vertices, faces = gbuffer.leaving
     tiles_x = -(-camera.width // kernels.TILE)
     tiles_y = -(-camera.height // kernels.TILE)
     counts = np.empty(tiles_x * tiles_y, np.int64)
-    kernels.count_covered(gbuffer.arrays.prim_id, tiles_x, counts)
+    kernels.count_covered(prim_id, tiles_x, counts)
     starts = np.cumsum(counts) - counts
     n = int(counts.sum())
     out = RayArrays(
@@ -215,10 +217,10 @@ def _surface_rays(
         reach,
         np.array(light),
         _check.integer("seed", seed, least=0, most=LARGEST_SEED),
-        gbuffer.arrays.prim_id,
+        prim_id,
         gbuffer.arrays.depth,
-        gbuffer.scene.arrays.vertices,
-        gbuffer.scene.arrays.faces,
+        vertices,
+        faces,
         camera.sight,
         tiles_x,
         starts,

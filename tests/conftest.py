@@ -9,9 +9,14 @@ import signal
 import pytest
 from hypothesis import settings
 
+from support import DATA
+
 settings.register_profile("same", derandomize=True)
 settings.register_profile("explore", derandomize=False)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
+
+# What somebody has imported on this machine is no part of the suite.
+os.environ.setdefault("HYBRID_RT_DATA", str(DATA))
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell has it ignored in what it starts in the background, and whatever a test starts would

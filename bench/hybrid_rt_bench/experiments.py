@@ -40,7 +40,7 @@ def load_experiment(name: str, *, quick: bool = False) -> AnyExperiment:
     ----------
     name : str
     quick : bool
-        Lay the file's ``[quick]`` table over the rest.
+        Lay the file's ``[quick]`` table over the other keys.
 
     Raises
     ------

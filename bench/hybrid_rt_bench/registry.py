@@ -50,6 +50,9 @@ class Kind:
         The columns of its results.
     tables : callable
         Returns the tables of a run, in the order of reading.
+    verdict : callable
+        Returns what a reader of the run takes home: sentences of one paragraph, with the numbers
+        and their intervals. It takes any run that has a measured cell.
     figures : sequence of callable
         Each writes pictures of a run into a folder and returns their paths.
     options : sequence of Option
@@ -57,6 +60,9 @@ class Kind:
         Returns the tables of how two of its runs differ; None for a kind without times.
     listing : callable, optional
         Returns tables for ``hybrid-rt list``.
+    frames : str
+        The experiment that takes the place of its own where ``--depth`` names a frame; empty for a
+        kind that has no such.
     """
 
     name: str
@@ -65,10 +71,12 @@ class Kind:
     run: Any
     schema: Any
     tables: Any
+    verdict: Any
     figures: Sequence[Any] = ()
     options: Sequence[Option] = ()
     compare: Any = None
     listing: Any = None
+    frames: str = ""
 
     def spec_class(self) -> type[AnyExperiment]:
         """Return the class of its experiments."""
@@ -88,6 +96,11 @@ class Kind:
     def table_maker(self) -> Callable[[RunData], list[Table]]:
         """Return what makes the tables."""
         found: Callable[[RunData], list[Table]] = self._found(self.tables)
+        return found
+
+    def verdict_maker(self) -> Callable[[RunData], str]:
+        """Return what says what a run comes to."""
+        found: Callable[[RunData], str] = self._found(self.verdict)
         return found
 
     def figure_makers(self) -> list[Callable[[RunData, Path], list[Path]]]:

@@ -11,6 +11,7 @@ from hybrid_rt_bench.measure.errors import reason_of
 from hybrid_rt_bench.registry import kinds
 from hybrid_rt_bench.report import render
 from hybrid_rt_bench.report.table import Table
+from hybrid_rt_bench.report.verdict import paragraph
 from hybrid_rt_bench.results.files import ReportsError
 from hybrid_rt_bench.results.folder import RunData, load_run
 
@@ -39,7 +40,23 @@ def render_run(run: RunData) -> tuple[list[Table], list[Path]]:
         The folder cannot be written to, or what it holds cannot be shown.
     """
     kind = kinds[run.kind]
-    return _whole(run, lambda: render.render_run(run, kind.table_maker(), kind.figure_makers()))
+    return _whole(
+        run,
+        lambda: render.render_run(
+            run, kind.table_maker(), kind.verdict_maker(), kind.figure_makers()
+        ),
+    )
+
+
+def verdict_of(run: RunData) -> str:
+    """Return the paragraph that says what a run comes to.
+
+    Raises
+    ------
+    ReportsError
+        What the folder holds cannot be shown.
+    """
+    return _whole(run, lambda: paragraph(run, kinds[run.kind].verdict_maker()))
 
 
 def compare_runs(a: RunData, b: RunData) -> list[Table]:

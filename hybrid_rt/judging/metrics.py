@@ -382,7 +382,7 @@ def rates(judged: Judged) -> dict[str, Rate]:
     Notes
     -----
     "pixel_error" is meant for answers by pixel. Those of a tracer may lie beside the camera, where
-    a pixel is so thin that rounding alone moves a hit by more than one (0.05 % of mirror rays).
+    a pixel is so thin that rounding alone moves a hit by more than one.
     """
     _check.instance("judged", judged, Judged)
     resolved = judged.verdict != Verdict.UNRESOLVED

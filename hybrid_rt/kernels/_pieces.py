@@ -1,8 +1,8 @@
 """How Numba compiles a function that is only called by compiled code: no further than it must.
 
 Numba makes of every function machine code of its own and two wrappers for Python. A function that
-ends up inside its callers needs neither, and of the time that a first picture takes to compile that
-was a third. What a piece is compiled to is left as LLVM's intermediate code, which callers link.
+ends up inside its callers needs neither, and these are much of what a first picture has to compile.
+What a piece is compiled to is left as LLVM's intermediate code, which callers link.
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ def hand_over(share, resolved, origin, direction, t_near, t_free, reach, starts)
 
     The tracer's own t errs, by 3e-7 of t on ordinary triangles and, on large ones that are seen at
     a grazing angle, by as much of the scene's `reach` over the sine: a hit just behind t_free must
-    not be rejected for it. The first term gives up 0.4 % of what hand-over saves; the second,
+    not be rejected for it. The first term gives up little of what hand-over saves; the second,
     1.5e-5 of the scene, covers that error down to a quarter of a degree.
     """
     n = resolved.shape[0]

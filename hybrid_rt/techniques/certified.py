@@ -69,7 +69,7 @@ class Certified(Technique):
     max_steps : int, optional
         Step budget of a ray. None: 2 (W + H) + 64, W by H the size of the lists, which no ray can
         use up. The default gives up those few that pass behind something near for long and take
-        half of the time; ``hybrid-rt run ablation`` measures both budgets.
+        much of the time; ``hybrid-rt run ablation`` measures both budgets.
     hand_over : bool
         Whether `hybrid_rt.trace_hybrid` starts unresolved rays where the proof ended.
     probes : {1, 2, 4, 8, 16}
@@ -159,7 +159,7 @@ class Certified(Technique):
 
     def _read(self, gbuffer: GBuffer, threads: int | None) -> CertifiedData:
         camera = self.lists_camera(gbuffer.camera)
-        lists = primitive_lists(gbuffer.scene, camera, int(self.lists), threads)
+        lists = primitive_lists(gbuffer.known_scene, camera, int(self.lists), threads)
         if not self.planes:
             # Every comparison denies NaN, so that no plane ever puts a primitive out of question.
             lists.planes.fill(np.nan)

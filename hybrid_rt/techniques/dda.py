@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hybrid_rt import _check
-from hybrid_rt.base import Point, Screen, Technique, register
+from hybrid_rt.base import Point, Screen, register
 from hybrid_rt.kernels.techniques.dda import PixelDDANumbers
-from hybrid_rt.rays.marched import Marched
-from hybrid_rt.rays.rays import Rays
 from hybrid_rt.techniques import stepping
 from hybrid_rt.techniques.stepping import DEFAULT_THICKNESS, THICKNESSES, Share
 
 
 @register
 @dataclass(frozen=True)
-class PixelDDA(Technique):
+class PixelDDA(stepping.Stepping):
     """Walk along the ray's line on the screen, "dda", pixel by pixel or every `stride` pixels.
 
     Samples lie `stride` pixels apart along the line's longer axis, so that no pixel is read twice
@@ -66,12 +64,11 @@ class PixelDDA(Technique):
             for each in (grid if which == "all" else [cls()])
         ]
 
-    def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
+    def _numbers(self, screen: Screen) -> PixelDDANumbers:
         camera = screen.camera
-        numbers = PixelDDANumbers(
-            *camera.receding(stepping.length_in(screen.scene, self.thickness)),
+        return PixelDDANumbers(
+            *camera.receding(stepping.length_in(screen, self.thickness)),
             int(self.stride),
             float(self.jitter),
             int(self.max_steps or camera.width + camera.height + 2),
         )
-        return stepping.march(rays, screen, None, numbers, threads)

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from hybrid_rt import _check
-from hybrid_rt.base import Point, Screen, Technique, register
+from hybrid_rt.base import Point, Screen, register
 from hybrid_rt.kernels.techniques.hiz import HiZNumbers
 from hybrid_rt.raster.gbuffer import GBuffer
 from hybrid_rt.raster.pyramid import DepthPyramid, build_depth_pyramid
-from hybrid_rt.rays.marched import Marched
-from hybrid_rt.rays.rays import Rays
 from hybrid_rt.techniques import stepping
 from hybrid_rt.techniques.stepping import DEFAULT_THICKNESS, THICKNESSES, Share
 
@@ -28,7 +26,7 @@ SWITCHES: dict[str, dict[str, Any]] = {
 
 @register
 @dataclass(frozen=True)
-class HiZ(Technique):
+class HiZ(stepping.Stepping):
     """March through the nearest-depth pyramid and trust what it finds by a confidence, "hiz".
 
     One cell is read at a time. Where the ray reaches the far side of the cell in front of its
@@ -113,10 +111,10 @@ class HiZ(Technique):
     def _read(self, gbuffer: GBuffer, threads: int | None) -> DepthPyramid:
         return build_depth_pyramid(gbuffer, threads=threads)
 
-    def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
+    def _numbers(self, screen: Screen) -> HiZNumbers:
         camera = screen.camera
-        numbers = HiZNumbers(
-            stepping.length_in(screen.scene, self.thickness),
+        return HiZNumbers(
+            stepping.length_in(screen, self.thickness),
             camera.far - camera.near if camera.parallel else camera.near,
             camera.parallel,
             float(self.threshold),
@@ -124,5 +122,5 @@ class HiZ(Technique):
             bool(self.exhausted_hits),
             bool(self.trace_background),
             int(self.max_steps),
+            *stepping.levels_of(screen.data),
         )
-        return stepping.march(rays, screen, screen.data, numbers, threads)

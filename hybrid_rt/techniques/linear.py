@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hybrid_rt import _check
-from hybrid_rt.base import Point, Screen, Technique, register
+from hybrid_rt.base import Point, Screen, register
 from hybrid_rt.kernels.techniques.linear import LinearNumbers
-from hybrid_rt.rays.marched import Marched
-from hybrid_rt.rays.rays import Rays
 from hybrid_rt.techniques import stepping
 from hybrid_rt.techniques.stepping import DEFAULT_THICKNESS, THICKNESSES, Share
 
 
 @register
 @dataclass(frozen=True)
-class Linear(Technique):
+class Linear(stepping.Stepping):
     """March in steps of one length in the world, "linear": the first screen-space reflections.
 
     At each step the ray's point is projected and its pixel read. A point behind the pixel's
@@ -80,15 +78,14 @@ class Linear(Technique):
         ]
         return [*points, Point(f"thickness {usual.thickness}, unrefined", cls(refinements=0))]
 
-    def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
+    def _numbers(self, screen: Screen) -> LinearNumbers:
         camera = screen.camera
-        numbers = LinearNumbers(
-            *camera.receding(stepping.length_in(screen.scene, self.thickness)),
+        return LinearNumbers(
+            *camera.receding(stepping.length_in(screen, self.thickness)),
             float(self.stride) * camera.stride_unit,
             int(self.refinements),
             int(self.max_steps),
         )
-        return stepping.march(rays, screen, None, numbers, threads)
 
 
 def _label(linear: Linear) -> str:

@@ -8,8 +8,6 @@ from hybrid_rt.base import Point, Screen, register
 from hybrid_rt.kernels.techniques.paper import PaperNumbers
 from hybrid_rt.raster.gbuffer import GBuffer
 from hybrid_rt.raster.pyramid import DepthPyramid, build_depth_pyramid
-from hybrid_rt.rays.marched import Marched
-from hybrid_rt.rays.rays import Rays
 from hybrid_rt.techniques import stepping
 
 
@@ -38,7 +36,7 @@ class Paper(stepping.Sampled):
 
     name = "paper"
     description = (
-        "The paper's strict march through a nearest-depth pyramid, then Embree for the rest"
+        "The paper's strict march through a nearest-depth pyramid, then Embree for unresolved rays"
     )
     reference = "Pikulsky 2025"
 
@@ -54,6 +52,5 @@ class Paper(stepping.Sampled):
     def _read(self, gbuffer: GBuffer, threads: int | None) -> DepthPyramid:
         return build_depth_pyramid(gbuffer, threads=threads)
 
-    def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
-        numbers = PaperNumbers(*self._budgets(screen.camera))
-        return stepping.march(rays, screen, screen.data, numbers, threads)
+    def _numbers(self, screen: Screen) -> PaperNumbers:
+        return PaperNumbers(*self._budgets(screen.camera), *stepping.levels_of(screen.data))

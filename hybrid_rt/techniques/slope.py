@@ -8,8 +8,6 @@ from hybrid_rt.base import Point, Screen, register
 from hybrid_rt.kernels.techniques.slope import SlopeNumbers
 from hybrid_rt.raster.gbuffer import GBuffer
 from hybrid_rt.raster.slope_pyramid import SlopePyramid, build_slope_pyramid
-from hybrid_rt.rays.marched import Marched
-from hybrid_rt.rays.rays import Rays
 from hybrid_rt.techniques import stepping
 
 
@@ -52,6 +50,5 @@ class SlopeAware(stepping.Sampled):
     def _read(self, gbuffer: GBuffer, threads: int | None) -> SlopePyramid:
         return build_slope_pyramid(gbuffer, threads=threads)
 
-    def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
-        numbers = SlopeNumbers(*self._budgets(screen.camera))
-        return stepping.march(rays, screen, screen.data, numbers, threads)
+    def _numbers(self, screen: Screen) -> SlopeNumbers:
+        return SlopeNumbers(*self._budgets(screen.camera), *stepping.levels_of(screen.data))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import abc
+import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,11 +12,12 @@ import numpy as np
 from hybrid_rt import _check, _threads
 from hybrid_rt.base import Point, Screen, Technique
 from hybrid_rt.camera.camera import Camera
+from hybrid_rt.kernels.arrays import I64
 from hybrid_rt.kernels.techniques import driver
-from hybrid_rt.raster.pyramid import Pyramid
+from hybrid_rt.kernels.techniques.placing import LANES
+from hybrid_rt.raster.pyramid import Pyramid, bits
 from hybrid_rt.rays.marched import Marched
 from hybrid_rt.rays.rays import Rays
-from hybrid_rt.scene.mesh import Scene
 
 MOST = 2**31 - 1
 
@@ -22,6 +25,8 @@ MOST = 2**31 - 1
 @dataclass(frozen=True)
 class Share:
     """A length as a share of the diagonal of the scene's bounding box.
+
+    Of a scene that is not known it is that of the visible points.
 
     World units mean nothing to a technique that does not know the scene; a share does.
 
@@ -51,9 +56,12 @@ def checked_thickness(value: Any) -> None:
         _check.real("thickness", value, above=0.0)
 
 
-def length_in(scene: Scene, length: float | Share) -> float:
-    """Return a length in a scene, world units."""
-    return length.value * scene.diagonal if isinstance(length, Share) else float(length)
+def length_in(screen: Screen, length: float | Share) -> float:
+    """Return a length in what is on a screen, world units; see `Share`."""
+    if not isinstance(length, Share):
+        return float(length)
+    low, high = screen.gbuffer.bounds
+    return length.value * math.dist(low, high)
 
 
 def checked_steps(max_steps: int | None) -> None:
@@ -62,8 +70,41 @@ def checked_steps(max_steps: int | None) -> None:
         _check.integer("max_steps", max_steps, least=1, most=MOST)
 
 
+class Stepping(Technique):
+    """A technique whose rays go by steps, through the levels of a pyramid or the depth buffer."""
+
+    @abc.abstractmethod
+    def _numbers(self, screen: Screen) -> Any:
+        """Return the parameters, as the kernel takes them; their type chooses it."""
+
+    def _march(self, rays: Rays, screen: Screen, any_hit: bool, threads: int | None) -> Marched:
+        return self._walked(rays, screen, (), threads)
+
+    def steps_by_level(self, rays: Rays, screen: Screen, *, threads: int | None = None) -> I64:
+        """Return how many samples the rays take of each level; as `Technique.steps_by_level`."""
+        screen = self._checked(rays, screen, threads)
+        if screen.data is None:  # every sample is of the depth buffer itself
+            steps = self._walked(rays, screen, (), threads).steps
+            return np.asarray(steps.sum(keepdims=True, dtype=np.int64))
+        with _threads.limited(threads) as workers:
+            counts = np.zeros((workers, len(screen.data) * LANES), np.int64)
+            self._walked(rays, screen, counts, threads)
+        return np.asarray(counts.reshape(workers, -1, LANES).sum(axis=(0, 2)))
+
+    def _walked(self, rays: Rays, screen: Screen, counts: Any, threads: int | None) -> Marched:
+        """March; `counts` as `kernels.techniques.driver.march` has them."""
+        marched = Marched.unfilled(len(rays))
+        pyramid = () if screen.data is None else screen.data.arrays
+        with _threads.limited(threads):
+            driver.march(
+                rays.arrays, screen.camera.arrays, screen.gbuffer.arrays, pyramid,
+                self._numbers(screen), marched.arrays, counts,
+            )  # fmt: skip
+        return marched
+
+
 @dataclass(frozen=True)
-class Sampled(Technique):
+class Sampled(Stepping):
     """A technique of the paper's kind: so many samples of one level before the level may rise."""
 
     samples: int = 4
@@ -83,20 +124,6 @@ class Sampled(Technique):
         return int(self.samples), int(self.max_steps or enough)
 
 
-def march(
-    rays: Rays, screen: Screen, pyramid: Pyramid | None, numbers: Any, threads: int | None
-) -> Marched:
-    """Return what a kernel of `kernels.techniques.driver` says about each ray.
-
-    `pyramid`: what it goes through, None for the depth buffer alone; `numbers`: its parameters.
-    """
-    marched = Marched.unfilled(len(rays))
-    with _threads.limited(threads) as workers:
-        steps_by_level = np.zeros((workers, 1 if pyramid is None else len(pyramid)), np.int64)
-        driver.march(
-            rays.arrays, screen.camera.arrays, screen.gbuffer.arrays,
-            () if pyramid is None else pyramid.arrays, numbers, marched.arrays, steps_by_level,
-        )  # fmt: skip
-    if pyramid is None:  # every sample is of the depth buffer itself
-        steps_by_level[0, 0] = marched.steps.sum(dtype=np.int64)
-    return replace(marched, steps_by_level=steps_by_level.sum(axis=0))
+def levels_of(pyramid: Pyramid) -> tuple[tuple[int, int], int]:
+    """Return what a kernel computes the place of a cell from: `bits`, and the last level."""
+    return bits(pyramid.width, pyramid.height), len(pyramid) - 1

@@ -1,6 +1,9 @@
 """Scenes by name: real ones from files, and places generated from code."""
 
 from hybrid_rt_scenes.automatic import automatic_cameras
+from hybrid_rt_scenes.given import GivenCamera, given_cameras
+from hybrid_rt_scenes.importing import ImportedScene, import_scene
+from hybrid_rt_scenes.places import data_directories, data_directory
 from hybrid_rt_scenes.registry import (
     SCENES,
     get_scene,
@@ -16,20 +19,24 @@ from hybrid_rt_scenes.spec import (
     MissingDataError,
     SceneSpec,
     automatic_lights,
-    data_directory,
 )
 
 __all__ = [
     "SCENES",
     "CameraSpec",
+    "GivenCamera",
+    "ImportedScene",
     "LightsSpec",
     "MeshSpec",
     "MissingDataError",
     "SceneSpec",
     "automatic_cameras",
     "automatic_lights",
+    "data_directories",
     "data_directory",
     "get_scene",
+    "given_cameras",
+    "import_scene",
     "read_definition",
     "register",
     "scene_from_path",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,12 @@ import hybrid_rt as hrt
 from hybrid_rt import _check
 from hybrid_rt.registry import Registry
 from hybrid_rt_scenes.automatic import automatic_cameras
+from hybrid_rt_scenes.given import given_cameras
+from hybrid_rt_scenes.places import data_directories
 from hybrid_rt_scenes.spec import CameraSpec, LightsSpec, MeshSpec, SceneSpec
 
 DEFINITIONS = Path(__file__).parent / "definitions"
+BY_PATH = "It was named by its path."
 
 
 class _Scenes(Registry[SceneSpec]):
@@ -42,13 +46,22 @@ def register(scene: SceneSpec) -> SceneSpec:
     return SCENES.register(scene)
 
 
-def _defined() -> list[str]:
-    return [path.stem for path in DEFINITIONS.glob("*.toml")]
+def _defined() -> dict[str, Path]:
+    """Return the definitions by name: those that come with the package, then imported ones."""
+    found: dict[str, Path] = {}
+    for folder in (DEFINITIONS, *data_directories()):
+        for path in sorted(folder.glob("*.toml")):
+            found.setdefault(path.stem, path)
+    return found
 
 
 def scene_names() -> list[str]:
-    """Return the names of all scenes, sorted, whether their data is there or not."""
-    return sorted([*_defined(), *SCENES])
+    """Return the names of all scenes, sorted, whether their data is there or not.
+
+    They are those that come with this package, those that ``hybrid-rt import`` has written to a
+    data directory, a ``NAME.toml`` each, and those of `register`.
+    """
+    return sorted({*_defined(), *SCENES})
 
 
 def get_scene(name: str) -> SceneSpec:
@@ -59,8 +72,8 @@ def get_scene(name: str) -> SceneSpec:
     UnknownNameError
         No such scene; the message suggests the nearest name.
     """
-    if name in _defined():
-        return read_definition(DEFINITIONS / f"{name}.toml")
+    if (path := _defined().get(name)) is not None:
+        return read_definition(path)
     if name not in SCENES:
         raise hrt.UnknownNameError("scene", str(name), scene_names())
     return SCENES[name]
@@ -76,12 +89,20 @@ def read_definition(path: Path) -> SceneSpec:
     ArgumentError
         Not TOML, a key that is missing, or a value of the wrong kind or out of range.
     """
+    return _validated(_table(path), path)
+
+
+def _table(path: Path) -> dict[str, Any]:
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
         raise hrt.ArgumentError(path.name, "a TOML file", str(error)) from error
     if "name" in table:
         raise hrt.UnknownNameError(f"key of {path.name}", "name", set(_keys(SceneSpec)) - {"name"})
+    return table
+
+
+def _validated(table: dict[str, Any], path: Path) -> SceneSpec:
     try:
         return SceneSpec.model_validate({**table, "name": path.stem})
     except hrt.UnknownNameError as error:
@@ -122,31 +143,71 @@ def _keys(model: type[BaseModel]) -> list[str]:
 
 
 def scene_from_path(path: str | Path) -> SceneSpec:
-    """Return a scene made of one mesh file, with cameras placed by what it shows.
+    """Return a scene of a mesh file, or the one that a TOML file of one's own defines.
 
     Parameters
     ----------
     path : str or Path
-        Any file that `hybrid_rt.read_mesh` reads. It is read at once, since the cameras depend on
-        it, and `load` of the result returns what was read.
+        Any file that `hybrid_rt.read_mesh` reads. It is read at once, since cameras depend on it,
+        and `load` of the result returns what was read. Its views are the cameras of a glTF file,
+        or else `automatic_cameras`. Or a ``.toml`` like those of this package, whose mesh files are
+        looked for beside it first; `title`, `description` and `needs` may be left out.
 
     Raises
     ------
     MeshFileError
         The file cannot be read.
+    ArgumentError, UnknownNameError
+        As `read_definition`.
+
+    Warns
+    -----
+    UserWarning
+        The cameras of a glTF file cannot be used; then the views are automatic.
     """
     path = Path(path)
+    if path.suffix.lower() == ".toml":
+        return _own_definition(path)
     scene = hrt.load_scene(path)
+    cameras = _own_cameras(path)
+    said = (
+        "Its cameras are those of the file."
+        if cameras
+        else "Its cameras were placed automatically, never inside closed geometry, so that "
+        "surfaces fill half of each picture at least."
+    )
     spec = SceneSpec(
         name=path.stem,
         title=path.name,
-        description=(
-            f"{len(scene)} triangles of {path.name}. Its cameras were placed automatically, "
-            "never inside closed geometry, so that surfaces fill half of each picture at least."
-        ),
-        needs="It was named by its path.",
+        description=f"{len(scene)} triangles of {path.name}. {said}",
+        needs=BY_PATH,
         mesh=(MeshSpec(file=str(path.resolve())),),
-        cameras=automatic_cameras(scene),
+        cameras=cameras or automatic_cameras(scene),
     )
     spec._loaded = scene
     return spec
+
+
+def _own_cameras(path: Path) -> dict[str, CameraSpec]:
+    """Return the views of a glTF file, if it has any that can be used."""
+    if path.suffix.lower() not in (".glb", ".gltf"):
+        return {}
+    try:
+        return given_cameras(hrt.load_cameras(path))
+    except hrt.HybridRTError as error:
+        warnings.warn(f"cameras are placed automatically: {error}", UserWarning, stacklevel=3)
+        return {}
+
+
+def _own_definition(path: Path) -> SceneSpec:
+    table = _table(path)
+    for key, value in (("title", path.stem), ("description", f"Defined by {path.name}.")):
+        table.setdefault(key, value)
+    meshes = table.get("mesh")
+    for mesh in meshes if isinstance(meshes, list) else []:
+        if isinstance(mesh, dict) and isinstance(mesh.get("file"), str):
+            beside = path.parent / mesh["file"]
+            if beside.is_file():
+                mesh["file"] = str(beside.resolve())
+            table.setdefault("needs", BY_PATH)
+    return _validated(table, path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import os
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,29 +11,14 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
 import hybrid_rt as hrt
 from hybrid_rt_scenes.generators import GENERATORS
-
-DATA_VARIABLE = "HYBRID_RT_DATA"
+from hybrid_rt_scenes.places import DATA_VARIABLE, data_directories, find_file
 
 Vector = tuple[float, float, float]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class MissingDataError(hrt.HybridRTError):
-    """A scene needs a mesh file that is not in the data directory."""
-
-
-def data_directory() -> Path:
-    """Return the folder in which mesh files of real scenes are looked for.
-
-    It is the one named by the environment variable ``HYBRID_RT_DATA``, else ``../shared/scenes``
-    beside the checkout that holds this package, else the same beside the current directory.
-    """
-    named = os.environ.get(DATA_VARIABLE)
-    if named:
-        return Path(named)
-    checkout = Path(__file__).resolve().parents[2]
-    root = checkout if (checkout / "pyproject.toml").is_file() else Path.cwd()
-    return root.parent / "shared" / "scenes"
+    """A scene needs a mesh file that is in none of the folders where such files are kept."""
 
 
 class _Strict(BaseModel):
@@ -116,7 +100,7 @@ class LightsSpec(_Strict):
 
 
 class MeshSpec(_Strict):
-    """Where triangles come from: a file of the data directory, or a generator.
+    """Where triangles come from: a file of a data directory, or a generator.
 
     Attributes
     ----------
@@ -156,10 +140,11 @@ class MeshSpec(_Strict):
         """Whether the number of triangles can be chosen."""
         return "size" in self._accepted()
 
-    def read(self, data_dir: Path, size: int | None) -> hrt.Mesh:
+    def read(self, folders: tuple[Path, ...], size: int | None) -> hrt.Mesh:
         """Return the triangles; `size` overrides the generator's own if it has one."""
         if self.generator is None:
-            return hrt.read_mesh(data_dir / str(self.file))
+            name = str(self.file)
+            return hrt.read_mesh(find_file(name, folders) or folders[0] / name)
         parameters: dict[str, Any] = dict(self.parameters)
         if size is not None and self.resizable:
             parameters["size"] = size
@@ -174,6 +159,10 @@ class SceneSpec(_Strict):
     name, title, description : str
     needs : str
         What has to be supplied and where it comes from; empty for a scene generated from code.
+    mark, note : str
+        Where the triangles are not the model that the title names, or not all of it: a word or
+        three that every report writes after the scene's name, and the sentence that says what
+        they mean, without its full stop. Both empty for a scene that is whole.
     mesh : tuple of MeshSpec
         The meshes that make the scene, in the order of their `prim_id`.
     lights : LightsSpec, optional
@@ -185,6 +174,8 @@ class SceneSpec(_Strict):
     title: str
     description: str
     needs: str = ""
+    mark: Annotated[str, Field(max_length=24)] = ""
+    note: str = ""
     mesh: Annotated[tuple[MeshSpec, ...], Field(min_length=1)]
     lights: LightsSpec | None = None
     cameras: Annotated[dict[str, CameraSpec], Field(min_length=1)]
@@ -194,6 +185,12 @@ class SceneSpec(_Strict):
     def _needs_fit(self) -> SceneSpec:
         if bool(self.needs) == self.builtin:
             raise ValueError("'needs' must say where mesh files come from, if there are any")
+        return self
+
+    @model_validator(mode="after")
+    def _mark_fits(self) -> SceneSpec:
+        if bool(self.mark) != bool(self.note):
+            raise ValueError("'mark' and 'note' go together")
         return self
 
     @property
@@ -228,14 +225,18 @@ class SceneSpec(_Strict):
         Parameters
         ----------
         data_dir : Path, optional
-            Where to look; default `data_directory`.
+            Where to look; default all of `data_directories`.
         """
-        folder = data_directory() if data_dir is None else data_dir
+        folders = _folders(data_dir)
         for mesh in self.mesh:
-            if mesh.file is not None and not (folder / mesh.file).is_file():
+            if mesh.file is not None and find_file(mesh.file, folders) is None:
+                looked = " nor in ".join(str(folder) for folder in folders)
+                absent = "neither in" if len(folders) > 1 else "not in"
                 return (
-                    f"scene {self.name!r} needs {mesh.file}, which is not in {folder}. "
-                    f"{self.needs} Put it there, or set {DATA_VARIABLE} to the folder that has it."
+                    f"scene {self.name!r} needs {mesh.file}, which is {absent} {looked}. "
+                    f"{self.needs} Bring it in with `hybrid-rt import FILE --name {self.name}` "
+                    f"(docs/scenes.md says where to get it), or set {DATA_VARIABLE} to the folder "
+                    f"that has {mesh.file}."
                 )
         return None
 
@@ -248,7 +249,7 @@ class SceneSpec(_Strict):
             Number of triangles wanted, for a scene with a generator that can choose; default its
             own.
         data_dir : Path, optional
-            Where mesh files are; default `data_directory`.
+            Where mesh files are; default all of `data_directories`.
 
         Raises
         ------
@@ -266,9 +267,12 @@ class SceneSpec(_Strict):
         said = self.missing(data_dir)
         if said is not None:
             raise MissingDataError(said)
-        folder = data_directory() if data_dir is None else data_dir
-        meshes = [mesh.read(folder, size) for mesh in self.mesh]
+        meshes = [mesh.read(_folders(data_dir), size) for mesh in self.mesh]
         return hrt.Scene.from_meshes(meshes, name=self.name)
+
+
+def _folders(data_dir: Path | None) -> tuple[Path, ...]:
+    return data_directories() if data_dir is None else (data_dir,)
 
 
 def automatic_lights(scene: hrt.Scene) -> LightsSpec:

@@ -23,6 +23,7 @@ TEST_LISTS = "tests/library/raster/test_lists.py"
 TEST_WALK = "tests/library/techniques/test_certified.py"
 ROUNDING = "tests/library/techniques/test_certified_precision.py"
 HYBRID = "tests/library/hybrid/test_hybrid.py"
+CAMERAS = "tests/library/techniques/test_technique_cameras.py"
 LANES = "tests/library/techniques/test_certified_lanes.py"
 PLANES = "tests/library/raster/test_lists_precision.py"
 BINS = "hybrid_rt/kernels/raster/lists_bins.py"
@@ -55,7 +56,7 @@ MUTANTS = (
     ),
     Mutant(
         "nearest vertex forgotten to be clipped", BINS,
-        "near / simd.maximum(q2 - e2, close)", "near / q2", TEST_LISTS,
+        "high / simd.maximum(q2 - e2, close)", "high / q2", TEST_LISTS,
     ),
     Mutant("what falls out of a list forgotten", LISTS,
            "if n <= length:", "if n < length:", TEST_LISTS),
@@ -70,15 +71,20 @@ MUTANTS = (
            "if near > F0 and level < 2 and not lowest > near:", TEST_WALK),
     Mutant("depth of the walk not lowered", WALK, "DEPTH_ULPS = 8.0", "DEPTH_ULPS = 0.0", ROUNDING),
     Mutant("ends beyond the near plane", "hybrid_rt/kernels/techniques/screen.py",
-           "s_end = (near - z) / (gz * near)", "s_end = 3.0 * (near - z) / (gz * near)", TEST_WALK),
+           "s_end = (d - w) / (d * gw - w * gd)",
+           "s_end = 3.0 * (d - w) / (d * gw - w * gd)", TEST_WALK),
+    Mutant("ends beyond the far plane", "hybrid_rt/kernels/techniques/screen.py",
+           "BEFORE_FAR = 1.0 - 2.0**-16", "BEFORE_FAR = 1.5", CAMERAS),
+    Mutant("a mirror image taken for one that is none", FACE_PLANES,
+           "side * hand", "side", CAMERAS),
     Mutant("edges without slack", WALK,
            "slack = 16.0 * E * r * size + 64.0 * (E * r) * (E * r)", "slack = 0.0", TEST_WALK),
     Mutant("ties decided", WALK, "found == T_UNDECIDED or (best >= 0 and high >= best_low)",
            "found == T_UNDECIDED", TEST_WALK),
     Mutant("first hit found taken for the nearest", WALK, "            if any_hit:",
            "            if best >= 0:", TEST_WALK),
-    Mutant("set-up trusted", WALK, "max(place / z, motion * s_end) <= U / 8.0",
-           "max(place / z, motion * s_end) >= 0.0", TEST_WALK),
+    Mutant("set-up trusted", WALK, "return spread * error <= U / 8.0 and",
+           "return spread >= 0.0 and", TEST_WALK),
     Mutant("scene's bounds reached too early", WALK,
            "return t_exit + 2.0**-40 * abs(t_exit)", "return 0.5 * t_exit", TEST_WALK),
     Mutant("more said to be free than is", WALK,

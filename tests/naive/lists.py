@@ -1,7 +1,7 @@
 """Which triangles touch a pixel's square and how near they come, in exact rational arithmetic.
 
-The triangle is clipped at the near plane and at the four planes through the eye and the sides of
-the square; depth = near / z is largest at one of the corners that are left.
+The triangle is clipped at the near plane, the far plane and the four planes through the sides of
+the square along the lines of sight; depth = d / w is largest at one of the corners that are left.
 """
 
 from fractions import Fraction
@@ -10,9 +10,10 @@ from naive.triangle import cross, sub
 
 
 def projected(point, matrix, eye):
-    """Return q = M (p - eye), exact for the numbers as they are."""
+    """Return q = M (p - eye, 1), (x w, y w, w, d), exact for the numbers as they are."""
     p = [Fraction(float(a)) - Fraction(float(b)) for a, b in zip(point, eye, strict=True)]
-    return tuple(sum(Fraction(float(row[k])) * p[k] for k in range(3)) for row in matrix)
+    p.append(Fraction(1))
+    return tuple(sum(Fraction(float(row[k])) * p[k] for k in range(4)) for row in matrix)
 
 
 def clip(polygon, side):
@@ -25,51 +26,51 @@ def clip(polygon, side):
             result.append(q)
         if (a > 0 and b < 0) or (a < 0 and b > 0):
             t = a / (a - b)
-            result.append(tuple(q[k] + t * (p[k] - q[k]) for k in range(3)))
+            result.append(tuple(q[k] + t * (p[k] - q[k]) for k in range(4)))
     return result
 
 
-def nearest_depth(triangle, near, x0, y0, x1, y1):
+def nearest_depth(triangle, x0, y0, x1, y1):
     """Return the largest depth of a projected triangle in a rectangle, None if it has none there.
 
-    `triangle` is three corners q; points before the near plane do not count.
+    `triangle` is three corners q; points before the near plane or beyond the far plane, where depth
+    is 0, do not count.
     """
-    near = Fraction(near)
-    polygon = clip(list(triangle), lambda q: q[2] - near)
+    polygon = clip(list(triangle), lambda q: q[2] - q[3])
     for side in (
+        lambda q: q[3],
         lambda q: q[0] - x0 * q[2],
         lambda q: x1 * q[2] - q[0],
         lambda q: q[1] - y0 * q[2],
         lambda q: y1 * q[2] - q[1],
     ):
         polygon = clip(polygon, side)
-    if not polygon:
-        return None
-    return max(near / q[2] for q in polygon)
+    largest = max((q[3] / q[2] for q in polygon), default=0)
+    return largest if largest > 0 else None
 
 
-def plane_depth(triangle, near, x, y):
+def plane_depth(triangle, x, y):
     """Return the exact depth of a projected triangle's plane at a place, None if it has none.
 
-    A point of the plane is q = z (x, y, 1) with n . q = n . q_a, so its depth is
-    near (n . (x, y, 1)) / (n . q_a).
+    The plane is ``d = n . (x w, y w, w)``: n by Cramer's rule from the three corners.
     """
-    a, b, c = triangle
-    n = cross(sub(b, a), sub(c, a))
-    below = sum(n[k] * a[k] for k in range(3))
+    a, b, c = (q[:3] for q in triangle)
+    below = sum(cross(a, b)[k] * c[k] for k in range(3))
     if below == 0:
         return None
-    return Fraction(near) * (n[0] * Fraction(x) + n[1] * Fraction(y) + n[2]) / below
+    d = [q[3] for q in triangle]
+    n = [d[0] * cross(b, c)[k] + d[1] * cross(c, a)[k] + d[2] * cross(a, b)[k] for k in range(3)]
+    return (n[0] * Fraction(x) + n[1] * Fraction(y) + n[2]) / below
 
 
 def has_area(triangle):
-    a, b, c = triangle
+    a, b, c = ([Fraction(float(x)) for x in p] for p in triangle)
     return any(cross(sub(b, a), sub(c, a)))
 
 
 def lists(vertices, faces, camera, margin, pixels):
     """Return {pixel: {face: nearest depth}} for the grown squares of some pixels."""
-    matrix, eye, near = camera.pixel_from_world, camera.eye, float(camera.near)
+    matrix, eye = camera.arrays.m, camera.eye
     grow = Fraction(margin)
     q = [projected(v, matrix, eye) for v in vertices]
     found = {}
@@ -77,8 +78,8 @@ def lists(vertices, faces, camera, margin, pixels):
         of_pixel = {}
         for face, corners in enumerate(faces):
             triangle = [q[v] for v in corners]
-            depth = nearest_depth(triangle, near, i - grow, j - grow, i + 1 + grow, j + 1 + grow)
-            if depth is not None and has_area(triangle):
+            depth = nearest_depth(triangle, i - grow, j - grow, i + 1 + grow, j + 1 + grow)
+            if depth is not None and has_area([vertices[v] for v in corners]):
                 of_pixel[face] = depth
         found[i, j] = of_pixel
     return found

@@ -8,6 +8,8 @@ import itertools
 import math
 from dataclasses import dataclass
 
+from naive import cameras
+
 HIT, MISS, OFFSCREEN, HIDDEN, NEAR, EXHAUSTED, INVALID = range(7)
 
 
@@ -25,7 +27,7 @@ def _dot(row, p):
     return row[0] * p[0] + row[1] * p[1] + row[2] * p[2]
 
 
-def march(origin, direction, own_pixel, t_near, t_far, depth, ddx, ddy, matrix, eye, near):
+def march(origin, direction, own_pixel, t_near, t_far, depth, ddx, ddy, camera):
     """March one ray; arrays as nested sequences or NumPy arrays, everything float64."""
     height, width = len(depth), len(depth[0])
     o = [float(x) for x in origin]
@@ -33,35 +35,40 @@ def march(origin, direction, own_pixel, t_near, t_far, depth, ddx, ddy, matrix, 
     unanswered = (-1, -1)
     if not all(math.isfinite(x) for x in o + d) or d == [0.0, 0.0, 0.0]:
         return Answer(INVALID, unanswered, math.inf, 0.0, 1.0)
-    q0 = [_dot(row, [o[k] - eye[k] for k in range(3)]) for row in matrix]
-    qd = [_dot(row, d) for row in matrix]
+    rows = cameras.rows(camera)
+    q0 = [_dot(row, [o[k] - camera.eye[k] for k in range(3)]) + row[3] for row in rows]
+    qd = [_dot(row, d) for row in rows]
 
-    def z(t):
+    def w(t):
         return q0[2] + t * qd[2]
 
     def x_px(t):
-        return qd[0] / qd[2] if math.isinf(t) else (q0[0] + t * qd[0]) / z(t)
+        return qd[0] / qd[2] if math.isinf(t) else (q0[0] + t * qd[0]) / w(t)
 
     def y_px(t):
-        return qd[1] / qd[2] if math.isinf(t) else (q0[1] + t * qd[1]) / z(t)
+        return qd[1] / qd[2] if math.isinf(t) else (q0[1] + t * qd[1]) / w(t)
 
     def z_depth(t):
-        return 0.0 if math.isinf(t) else near / z(t)
+        return 0.0 if math.isinf(t) else (q0[3] + t * qd[3]) / w(t)
 
-    margin = abs(z(t_near) / near - 1)
-    if z(t_near) < near:
+    near = q0[3] + t_near * qd[3]
+    margin = abs(w(t_near) - near) / (abs(near) or 1.0)
+    if w(t_near) < near:
         return Answer(NEAR, unanswered, math.inf, 0.0, margin)
     x, y = x_px(t_near), y_px(t_near)
-    margin = min(margin, abs(x), abs(y), abs(width - x), abs(height - y))
-    if not (0 <= x <= width and 0 <= y <= height):
+    margin = min(margin, abs(x), abs(y), abs(width - x), abs(height - y), abs(near))
+    if not (0 <= x <= width and 0 <= y <= height and near > 0):
         return Answer(OFFSCREEN, unanswered, math.inf, 0.0, margin)
 
-    # Where the ray ends: at the near plane, at t_far or nowhere; the image's border is found below.
+    # Where the ray ends: at the near or the far plane, at t_far or nowhere; the image's border is
+    # found below.
     t_end, end = t_far, MISS
-    if qd[2] < 0:
-        t_plane = (near - q0[2]) / qd[2]
+    if qd[2] < qd[3]:
+        t_plane = (q0[3] - q0[2]) / (qd[2] - qd[3])
         if t_plane < t_end:
             t_end, end = t_plane, NEAR
+    if cameras.is_parallel(camera) and qd[3] < 0 and -q0[3] / qd[3] < t_end:
+        t_end, end = -q0[3] / qd[3], OFFSCREEN
     if math.isinf(t_end) and qd[2] == 0:
         t_end = 1e30
     cuts = []

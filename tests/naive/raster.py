@@ -9,35 +9,30 @@ from fractions import Fraction
 
 import numpy as np
 
+from naive import cameras
+
 GUARD_LOW, GUARD_HIGH = -16384.0, 49152.0
 
 
 class View:
-    """The numbers of a camera: eye, unit axes, field of view, size, near plane."""
+    """The numbers of a camera: eye, unit axes, pixels of a length, size, planes."""
 
     def __init__(self, camera):
+        self.camera = camera
         self.eye = [float(x) for x in camera.eye]
         self.right = [float(x) for x in camera.right]
         self.up = [float(x) for x in camera.up]
         self.forward = [float(x) for x in camera.forward]
         self.width, self.height, self.near = camera.width, camera.height, camera.near
-        self.f = 0.5 * self.height / math.tan(math.radians(camera.vfov_deg) / 2)
-        self.rows = [
-            [
-                self.f * r + 0.5 * self.width * w
-                for r, w in zip(self.right, self.forward, strict=True)
-            ],
-            [
-                -self.f * u + 0.5 * self.height * w
-                for u, w in zip(self.up, self.forward, strict=True)
-            ],
-            self.forward,
-        ]
+        self.fx, self.fy = cameras.scales(camera)
+        self.cx, self.cy = cameras.middle(camera)
+        self.parallel = cameras.is_parallel(camera)
+        self.rows = cameras.rows(camera)
 
     def project(self, p):
-        """Return (x z, y z, z) of a world point."""
+        """Return (x w, y w, w, d) of a world point."""
         r = [float(a) - b for a, b in zip(p, self.eye, strict=True)]
-        return tuple(dot(row, r) for row in self.rows)
+        return tuple(dot(row, r) + row[3] for row in self.rows)
 
 
 def dot(a, b):
@@ -69,13 +64,12 @@ def clip(polygon, inside):
 def outline(view, triangle):
     """Return the snapped corners (x, y) in 1/256 pixel of a clipped triangle, [] if none."""
     polygon = [view.project(p) for p in triangle]
-    near = view.near
-    kept = clip(polygon, lambda q: q[2] - near)
+    kept = clip(polygon, lambda q: q[2] - q[3])
     if not kept:
         return []
     if kept != polygon:
         # A cut point lies on the near plane exactly.
-        kept = [q if q in polygon else (q[0], q[1], near) for q in kept]
+        kept = [q if q in polygon else (q[0], q[1], q[3], q[3]) for q in kept]
     for inside in (
         lambda q: q[0] - GUARD_LOW * q[2],
         lambda q: GUARD_HIGH * q[2] - q[0],
@@ -84,7 +78,7 @@ def outline(view, triangle):
     ):
         kept = clip(kept, inside)
     clamp = lambda x: min(max(x, GUARD_LOW), GUARD_HIGH)  # noqa: E731
-    return [tuple(math.floor(clamp(c / z) * 256 + 0.5) for c in (x, y)) for x, y, z in kept]
+    return [tuple(math.floor(clamp(c / z) * 256 + 0.5) for c in (x, y)) for x, y, z, _ in kept]
 
 
 def covered(corners, x, y):
@@ -112,18 +106,31 @@ def plane(view, triangle):
     n = cross(
         [x - y for x, y in zip(b, a, strict=True)], [x - y for x, y in zip(c, a, strict=True)]
     )
-    d = dot(n, [x - y for x, y in zip(a, view.eye, strict=True)])
-    z = [view.project(p)[2] for p in triangle]
-    if d == 0 or max(z) < view.near:
+    to_a = [x - y for x, y in zip(a, view.eye, strict=True)]
+    q = [view.project(p) for p in triangle]
+    depths = [1.0 if w <= d else d / w for _, _, w, d in q]
+    if all(w < d for _, _, w, d in q):
         return None
-    scale = view.near / d
-    return (
-        scale * dot(n, view.forward),
-        scale * dot(n, [x / view.f for x in view.right]),
-        scale * dot(n, [-x / view.f for x in view.up]),
-        view.near / max(z),
-        view.near / max(min(z), view.near),
-    )
+    across = [x / view.fx for x in view.right]
+    down = [-x / view.fy for x in view.up]
+    aside = [view.cx - 0.5 * view.width, view.cy - 0.5 * view.height]
+    # From where the axis is to the middle of the screen.
+    offset = [aside[0] * x + aside[1] * y for x, y in zip(across, down, strict=True)]
+    if view.parallel:
+        below = dot(n, view.forward) * (view.camera.far - view.near)
+        if below == 0:
+            return None
+        # The line of sight o + z forward meets the plane where n . (o + z forward - a) = 0.
+        z = dot(n, [x + y for x, y in zip(to_a, offset, strict=True)]) / dot(n, view.forward)
+        centre = cameras.depth_of(view.camera, z)
+        scale = 1.0 / below
+    else:
+        below = dot(n, to_a)
+        if below == 0:
+            return None
+        scale = view.near / below
+        centre = scale * dot(n, [x - y for x, y in zip(view.forward, offset, strict=True)])
+    return centre, scale * dot(n, across), scale * dot(n, down), min(depths), max(depths)
 
 
 def coverage(view, triangle):
@@ -160,7 +167,7 @@ def rasterize(vertices, faces, camera):
 
 
 def exact_depth(vertices, face, camera, x, y):
-    """Return near / z of a triangle's plane at (x, y) in pixels, in rational arithmetic.
+    """Return the depth of a triangle's plane at (x, y) in pixels, in rational arithmetic.
 
     The camera's axes are taken as the float64 numbers they are.
     """
@@ -173,7 +180,11 @@ def exact_depth(vertices, face, camera, x, y):
         [s - t for s, t in zip(b, a, strict=True)], [s - t for s, t in zip(c, a, strict=True)]
     )
     d = dot(n, [s - t for s, t in zip(a, eye, strict=True)])
-    u = (Fraction(float(x)) - Fraction(view.width, 2)) / Fraction(view.f)
-    v = (Fraction(view.height, 2) - Fraction(float(y))) / Fraction(view.f)
-    ray = [w + u * r + v * t for w, r, t in zip(forward, right, up, strict=True)]
-    return Fraction(view.near) * dot(n, ray) / d
+    u = (Fraction(float(x)) - Fraction(view.cx)) / Fraction(view.fx)
+    v = (Fraction(view.cy) - Fraction(float(y))) / Fraction(view.fy)
+    aside = [u * r + v * t for r, t in zip(right, up, strict=True)]
+    if view.parallel:
+        z = (d - dot(n, aside)) / dot(n, forward)
+        near, far = Fraction(view.near), Fraction(camera.far)
+        return (far - z) / (far - near)
+    return Fraction(view.near) * dot(n, [w + s for w, s in zip(forward, aside, strict=True)]) / d

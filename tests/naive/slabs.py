@@ -13,8 +13,10 @@ def _compare(ray, own, t, thickness):
     surface = ray.view.depth[pixel[1]][pixel[0]]
     if surface <= 0 or pixel == tuple(own):
         return FRONT, pixel
-    behind = ray.z(t) - ray.view.near / surface
-    ray.decide(behind / ray.z(t), (behind - thickness) / ray.z(t))
+    behind = ray.z(t) - ray.view.z_of(surface)
+    camera = ray.view.camera
+    scale = camera.far - camera.near if ray.view.parallel else ray.z(t)
+    ray.decide(behind / scale, (behind - thickness) / scale)
     if behind < 0:
         return FRONT, pixel
     return (INSIDE if behind <= thickness else BEHIND), pixel
@@ -27,7 +29,8 @@ def linear(
     ray = Ray(view, origin, direction, t_near, t_far)
     if ray.early:
         return ray.early
-    step = stride * ray.z(t_near) / ray.length
+    unit = view.camera.view_height if view.parallel else ray.z(t_near)
+    step = stride * unit / ray.length
     t_free, passed, k = t_near, False, 0
     while True:
         k += 1
@@ -89,14 +92,14 @@ def dda(view, origin, direction, own, t_near, t_far, *, thickness, stride, jitte
             surface = view.depth[pixel[1]][pixel[0]]
             if surface > 0:
                 depths = sorted((ray.depth(first), ray.depth(last)))
-                bottom = view.near / (view.near / surface + thickness)
-                ray.decide(depths[0] / surface - 1)
+                bottom = view.depth_of(view.z_of(surface) + thickness)
+                ray.decide(view.differ(depths[0], surface))
                 if depths[0] <= surface:
-                    ray.decide(depths[1] / bottom - 1)
+                    ray.decide(view.differ(depths[1], bottom))
                     if depths[1] >= bottom:
                         inside = min(max(surface, depths[0]), depths[1])
-                        t = ray.t_end if inside == 0 else (view.near / inside - ray.q0[2])
-                        t = t / ray.qd[2] if ray.qd[2] else first
+                        t = ray.t_of(view.z_of(inside)) if ray.zd else first
+                        t = ray.t_end if inside == 0 else t
                         return ray.answer(HIT, pixel, min(max(t, first), last), t_free)
                     passed = True
         t_free = t_free if passed else last

@@ -50,7 +50,7 @@ def hiz(
         surface = view.depth[pixel[1]][pixel[0]]
         if surface <= 0:
             continue
-        ray.decide(ray.depth(a) / surface - 1, ray.depth(b) / surface - 1)
+        ray.decide(*(view.differ(ray.depth(t), surface) for t in (a, b)))
         if ray.depth(a) <= surface:
             t = a
         elif ray.depth(b) <= surface:
@@ -69,15 +69,15 @@ def hiz(
 
 def _confidence(ray, pixel, t, thickness, border):
     view = ray.view
-    # The normal of the pixel's plane in the space of q = M (p - eye), turned to the eye: along it,
-    # near - a q_x - b q_y - c q_z is positive where the eye is.
+    # The normal of the pixel's plane in the space of q = M (p - eye, 1), turned to where
+    # q_d - a q_x - b q_y - c q_w is positive.
     a, b = view.ddx[pixel[1]][pixel[0]], view.ddy[pixel[1]][pixel[0]]
-    normal = (-a, -b, -view.plane(pixel, 0, 0))
+    normal = (-a, -b, -view.plane(pixel, 0, 0), 1.0)
     along = [n * q for n, q in zip(normal, ray.qd, strict=True)]
     ray.decide(sum(along) / (sum(map(abs, along)) or 1.0))
     if sum(along) >= 0:
         return 0.0
-    apart = abs(ray.z(t) - view.near / view.depth[pixel[1]][pixel[0]])
+    apart = abs(ray.z(t) - view.z_of(view.depth[pixel[1]][pixel[0]]))
     vignette = 1.0
     for place, size in zip(ray.at(t), (view.width, view.height), strict=True):
         if border > 0:

@@ -7,6 +7,8 @@ import itertools
 import math
 from dataclasses import dataclass
 
+from naive import cameras
+
 HIT, MISS, OFFSCREEN, HIDDEN, NEAR, EXHAUSTED, INVALID = range(7)
 NOWHERE = (-1, -1)
 
@@ -25,14 +27,27 @@ class Answer:
 class View:
     """What a march sees: depths, derivatives and the camera, as float64."""
 
-    def __init__(self, depth, ddx, ddy, matrix, eye, near):
+    def __init__(self, depth, ddx, ddy, camera):
         self.depth = [[float(v) for v in row] for row in depth]
         self.ddx = [[float(v) for v in row] for row in ddx]
         self.ddy = [[float(v) for v in row] for row in ddy]
-        self.matrix = [[float(v) for v in row] for row in matrix]
-        self.eye = [float(v) for v in eye]
-        self.near = float(near)
+        self.camera = camera
+        self.parallel = cameras.is_parallel(camera)
+        self.eye = [float(v) for v in camera.eye]
+        self.forward = [float(v) for v in camera.forward]
         self.height, self.width = len(self.depth), len(self.depth[0])
+
+    def z_of(self, depth):
+        """Return how far along the view from the eye a depth is."""
+        return cameras.z_of(self.camera, depth)
+
+    def depth_of(self, z):
+        """Return the depth of a distance along the view."""
+        return cameras.depth_of(self.camera, z)
+
+    def differ(self, a, b):
+        """Return by how much two depths differ: a share, or of parallel sight a share of all."""
+        return a - b if self.parallel else a / b - 1
 
     def plane(self, pixel, x, y):
         """Return the depth of the pixel's tilted plane at a place on the screen."""
@@ -53,22 +68,30 @@ class Ray:
             return
         self.length = math.sqrt(sum(v * v for v in self.d))
         start = [self.o[k] - view.eye[k] for k in range(3)]
-        self.q0 = [sum(row[k] * start[k] for k in range(3)) for row in view.matrix]
-        self.qd = [sum(row[k] * self.d[k] for k in range(3)) for row in view.matrix]
-        self.decide(self.z(t_near) / view.near - 1)
-        if self.z(t_near) < view.near:
+        rows = cameras.rows(view.camera)
+        self.q0 = [sum(row[k] * start[k] for k in range(3)) + row[3] for row in rows]
+        self.qd = [sum(row[k] * self.d[k] for k in range(3)) for row in rows]
+        self.z0 = sum(view.forward[k] * start[k] for k in range(3))
+        self.zd = sum(view.forward[k] * self.d[k] for k in range(3))
+        w, d = self.q0[2] + t_near * self.qd[2], self.q0[3] + t_near * self.qd[3]
+        self.decide((w - d) / (abs(d) or 1.0))
+        if w < d:
             self.early = self.answer(NEAR, t_free=0.0)
             return
         x, y = self.at(t_near)
-        self.decide(x, y, view.width - x, view.height - y)
-        if not (0 <= x <= view.width and 0 <= y <= view.height):
+        self.decide(x, y, view.width - x, view.height - y, d / w)
+        if not (0 <= x <= view.width and 0 <= y <= view.height and d > 0):
             self.early = self.answer(OFFSCREEN, t_free=0.0)
             return
         self.t_end, self.end = t_far, MISS
-        if self.qd[2] < 0:
-            t = (view.near - self.q0[2]) / self.qd[2]
+        if self.qd[2] < self.qd[3]:
+            t = (self.q0[3] - self.q0[2]) / (self.qd[2] - self.qd[3])
             if t < self.t_end:
                 self.t_end, self.end = t, NEAR
+        if view.parallel and self.qd[3] < 0:  # to the far plane
+            t = -self.q0[3] / self.qd[3]
+            if t < self.t_end:
+                self.t_end, self.end = t, OFFSCREEN
         sides = [(0, 0), (0, view.width), (1, 0), (1, view.height)]
         for axis, line in sides:
             t = self.reach(axis, line)
@@ -85,7 +108,12 @@ class Ray:
         self.margin = min(self.margin, *(abs(d) for d in distances))
 
     def z(self, t):
-        return self.q0[2] + t * self.qd[2]
+        """Return how far along the view from the eye the ray is at t."""
+        return self.z0 + t * self.zd
+
+    def t_of(self, z):
+        """Return the t at which the ray is so far along the view."""
+        return (z - self.z0) / self.zd
 
     def at(self, t):
         """Return x and y in pixels."""
@@ -93,11 +121,13 @@ class Ray:
             if self.qd[2] == 0:
                 return (math.nan, math.nan)
             return self.qd[0] / self.qd[2], self.qd[1] / self.qd[2]
-        z = self.z(t)
-        return (self.q0[0] + t * self.qd[0]) / z, (self.q0[1] + t * self.qd[1]) / z
+        w = self.q0[2] + t * self.qd[2]
+        return (self.q0[0] + t * self.qd[0]) / w, (self.q0[1] + t * self.qd[1]) / w
 
     def depth(self, t):
-        return 0.0 if math.isinf(t) else self.view.near / self.z(t)
+        if math.isinf(t):
+            return 0.0
+        return (self.q0[3] + t * self.qd[3]) / (self.q0[2] + t * self.qd[2])
 
     def reach(self, axis, line):
         """Return the t at which a coordinate is `line`, or None if never at a finite t."""

@@ -1,6 +1,7 @@
 """Each part of the project once, where it stands on its dependencies. Run by ``oldest.py``."""
 
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -105,6 +106,9 @@ def main():
             )  # fmt: skip
             (run,) = (folder / "runs").iterdir()
             command("report", str(run))
+            os.environ["HYBRID_RT_DATA"] = str(folder / "data")
+            command("import", str(folder / "ball.obj"))
+            command("list")
     print("the oldest dependencies do")
 
 

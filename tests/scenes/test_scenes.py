@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import shutil
 
 import numpy as np
+import platformdirs
 import pytest
 import trimesh
 from embreex.mesh_construction import TriangleMesh
@@ -14,12 +16,14 @@ import hybrid_rt as hrt
 from hybrid_rt_scenes import (
     MissingDataError,
     SceneSpec,
+    data_directories,
     data_directory,
     get_scene,
     read_definition,
     scene_from_path,
     scene_names,
 )
+from hybrid_rt_scenes import spec as spec_module
 from hybrid_rt_scenes.atrium import atrium
 from hybrid_rt_scenes.primitives import lathe, place, quad, tubes
 from hybrid_rt_scenes.simple import geodesic
@@ -242,7 +246,10 @@ def test_missing_data_is_said_with_what_where_and_how(tmp_path):
     spec = get_scene("sponza")
     said = spec.missing(tmp_path)
     assert said is not None
-    for word in ("sponza.npz", str(tmp_path), "Crytek", "HYBRID_RT_DATA"):
+    for word in (
+        "sponza.npz", str(tmp_path), "Crytek", "HYBRID_RT_DATA", "hybrid-rt import",
+        "docs/scenes.md",
+    ):  # fmt: skip
         assert word in said
     with pytest.raises(MissingDataError) as caught:
         spec.load(data_dir=tmp_path)
@@ -261,8 +268,41 @@ def test_data_is_found_where_the_variable_says(tmp_path, monkeypatch):
     assert get_scene("sponza").missing() is None
     scene = get_scene("sponza").load()
     assert (scene.name, len(scene)) == ("sponza", 1)
+
+
+def test_without_the_variable_it_is_the_users_folder_and_then_that_beside_the_checkout(monkeypatch):
     monkeypatch.delenv("HYBRID_RT_DATA")
-    assert data_directory() == ROOT.parent / "shared" / "scenes"
+    users = platformdirs.user_data_path("hybrid-rt", appauthor=False)
+    assert data_directory() == users
+    assert data_directories() == (users, ROOT.parent / "shared" / "scenes")
+
+
+def test_files_are_found_in_the_first_folder_that_has_them(tmp_path, monkeypatch):
+    first, second = tmp_path / "first", tmp_path / "second"
+    for k, folder in enumerate((first, second)):
+        folder.mkdir()
+        vertices = np.eye(3, dtype=np.float32) * (k + 1)
+        np.savez(folder / "sponza.npz", vertices=vertices, faces=[[0, 1, 2]])
+    shutil.copy(second / "sponza.npz", second / "conference.npz")
+    monkeypatch.setattr(spec_module, "data_directories", lambda: (first, second))
+    assert get_scene("sponza").load().bounds.max() == 1
+    assert get_scene("conference").load().bounds.max() == 2
+    said = get_scene("kitchen").missing()
+    assert f"neither in {first} nor in {second}" in said
+
+
+def test_definitions_in_the_data_directory_are_scenes(tmp_path, monkeypatch):
+    monkeypatch.setenv("HYBRID_RT_DATA", str(tmp_path))
+    np.savez(tmp_path / "own.npz", vertices=np.eye(3, dtype=np.float32), faces=[[0, 1, 2]])
+    (tmp_path / "own.toml").write_text(
+        GOOD.replace('generator = "sphere"', 'file = "own.npz"').replace(
+            "description", 'needs = "Mine."\ndescription', 1
+        )
+    )
+    (tmp_path / "sphere.toml").write_text("no scene at all")  # the package's own is asked first
+    assert scene_names() == sorted(BUILT_IN + REAL + ("own",))
+    assert len(get_scene("own").load()) == 1
+    assert get_scene("sphere").builtin
 
 
 def test_a_file_from_the_command_line_gets_cameras_that_see_it(tmp_path, small):

@@ -7,7 +7,7 @@ import sys
 import typer
 
 from hybrid_rt.errors import HybridRTError
-from hybrid_rt_bench.cli import compare, info, listing, render, report, run, terminal
+from hybrid_rt_bench.cli import compare, importing, info, listing, render, report, run, terminal
 
 app = typer.Typer(
     name="hybrid-rt",
@@ -30,6 +30,7 @@ run.add_to(app)
 app.command()(report.report)
 app.command()(compare.compare)
 app.command("list")(listing.list_all)
+app.command("import")(importing.import_mesh)
 app.command()(info.info)
 app.command()(render.render)
 

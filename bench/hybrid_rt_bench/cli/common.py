@@ -22,8 +22,14 @@ Threads = Annotated[
 
 
 def rendered(data: RunData, *, show: bool) -> list[Path]:
-    """Write the tables and figures of a run, print them where asked for, and return the paths."""
-    from hybrid_rt_bench.runs import render_run
+    """Write the tables and figures of a run, print them and its verdict where asked for.
+
+    Returns
+    -------
+    list of Path
+        Every file written.
+    """
+    from hybrid_rt_bench.runs import render_run, verdict_of
 
     with terminal.err().status("writing tables and figures"):
         tables, written = render_run(data)
@@ -32,6 +38,8 @@ def rendered(data: RunData, *, show: bool) -> list[Path]:
             show_table(table, written[0])
         for path in written:
             terminal.out().print(f"wrote {path}", soft_wrap=True, highlight=False)
+        terminal.out().print()
+        terminal.out().print(verdict_of(data), highlight=False)
     return written
 
 

@@ -2,15 +2,40 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import typer
+
 from hybrid_rt_bench.cli import terminal
 
 
-def info() -> None:
-    """Show versions, CPU, what Embree chose, and problems that would spoil measurements."""
+def info(
+    what: Annotated[
+        str | None,
+        typer.Argument(help="A mesh, a definition, a file of cameras, or a scene by name."),
+    ] = None,
+) -> None:
+    """Show what is in a file; or versions, CPU, where scenes are kept, problems of measuring.
+
+    Of a mesh: triangles, objects, bounds and cameras.
+
+    Examples
+    --------
+    * `hybrid-rt info` - this machine
+
+    * `hybrid-rt info hall.glb`
+    """
+    if what is not None:
+        from hybrid_rt_bench.cli import contents
+
+        contents.show(what)
+        return
     import numba
     from rich.table import Table
 
+    import hybrid_rt_scenes as hrs
     from hybrid_rt_bench.measure import environment as env
+    from hybrid_rt_scenes import data_directories
 
     out = terminal.out()
     load = env.load_average()
@@ -22,7 +47,15 @@ def info() -> None:
         elif key == "memory_bytes":
             key, value = "memory", f"{value / 2**30:.1f} GiB"
         table.add_row(key.replace("_", " "), str(value))
+    specs = [hrs.get_scene(name) for name in hrs.scene_names()]
+    there = [spec for spec in specs if spec.missing() is None]
+    named = (f"{spec.name} ({spec.mark})" if spec.mark else spec.name for spec in there)
+    table.add_row("scenes", ", ".join(named))
+    table.add_row("scenes looked for in", "\n".join(map(str, data_directories())))
     out.print(table)
+    for spec in there:
+        if spec.mark:
+            out.print(f"{spec.name}, {spec.mark}: {spec.note}.", soft_wrap=True, highlight=False)
     problems = env.problems(found)
     if not problems:
         out.print("no problems found", style="green")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from rich.table import Table
 from rich.text import Text
 
+from hybrid_rt.errors import HybridRTError
 from hybrid_rt_bench.cli import terminal
 from hybrid_rt_bench.cli.common import show_table
 
@@ -42,15 +43,22 @@ def _scenes() -> None:
     out = terminal.out()
     missing, rows = [], []
     for name in hrs.scene_names():
-        spec = hrs.get_scene(name)
+        try:
+            spec = hrs.get_scene(name)
+        except HybridRTError as error:  # a definition in the data directory that was damaged
+            missing.append(f"scene {name!r} cannot be used: {error}")
+            continue
         absent = spec.missing()
         state = "built in" if spec.builtin else "missing" if absent else "found"
         if absent:
             missing.append(absent)
-        named = Text.assemble(name, "\n", (state, "dim"))
-        rows.append((named, "\n".join(spec.cameras), spec.description))
+        mark = f", {spec.mark}" if spec.mark else ""
+        named = Text.assemble(name, "\n", (state + mark, "dim"))
+        note = f"\n{spec.mark}: {spec.note}" if spec.mark else ""
+        rows.append((named, "\n".join(spec.cameras), spec.description + note))
     _table("Scenes", ("scene", "cameras", "what it is"), rows)
-    out.print(f"Real scenes are looked for in {hrs.data_directory()}", soft_wrap=True)
+    places = ", then in ".join(map(str, hrs.data_directories()))
+    out.print(f"Mesh files of scenes are looked for in {places}", soft_wrap=True)
     for text in missing:
         out.print(text, style="yellow", soft_wrap=True, highlight=False)
 

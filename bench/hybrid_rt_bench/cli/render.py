@@ -28,10 +28,17 @@ class What(StrEnum):
 
 
 def render(
-    scene: Annotated[str, typer.Argument(help="Name of a scene, or path of a mesh file.")],
+    scene: Annotated[
+        str, typer.Argument(help="Name of a scene, or path of a mesh file or a definition.")
+    ],
     output: Annotated[Path, typer.Option("-o", "--output", help="PNG to write.")],
     camera: Annotated[
-        str | None, typer.Option("--camera", help="Name of a camera; default: the first.")
+        str | None,
+        typer.Option(
+            "--camera",
+            help="Name of a camera, or FILE or FILE:NAME of .toml, .glb or .gltf; "
+            "default: the first.",
+        ),
     ] = None,
     eye: Annotated[
         str | None, typer.Option("--eye", help="X,Y,Z of a camera of your own; with --target.")
@@ -61,9 +68,14 @@ def render(
 
     * `hybrid-rt render sponza --camera nave --what all --size 1920x1080 -o sponza.png`
 
+    * `hybrid-rt render hall.glb -o hall.png` - by the file's own camera, if it has one
+
+    * `hybrid-rt render hall.obj --camera views.toml:door -o hall.png`
+
     * `hybrid-rt render hall.glb --eye 0,1.7,5 --target 0,1,0 --fov 75 -o hall.png`
     """
     from hybrid_rt_bench.cli import pictures
+    from hybrid_rt_bench.measure import viewpoints
     from hybrid_rt_bench.measure.experiment import Resolution
     from hybrid_rt_bench.measure.plan import find_scene
 
@@ -72,7 +84,10 @@ def render(
     own = None
     if eye is not None or target is not None:
         own = _own_camera(eye, target, up, fov, camera)
-    view = own or spec.camera(camera or next(iter(spec.cameras)), pixels.width, pixels.height)
+    if own is None and camera is not None and viewpoints.is_file(camera):
+        view = viewpoints.camera_in("--camera", camera).resized(pixels.width, pixels.height)
+    else:
+        view = own or spec.camera(camera or next(iter(spec.cameras)), pixels.width, pixels.height)
     pictures.check_output(output)
     pictures.check_memory(pixels.width, pixels.height, what.value)
     loaded = spec.load()

@@ -35,7 +35,7 @@ def run(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a summary as JSON, and nothing else, on stdout.")
     ] = False,
-    **given: str | int | None,
+    **given: str | float | None,
 ) -> None:
     """Measure an experiment and write its tables and figures.
 
@@ -62,18 +62,23 @@ def run(
 
     * `hybrid-rt run error --techniques paper,slope` - only some of the techniques
 
+    * `hybrid-rt run error --depth dump.npz --scene hall.glb` - a depth buffer of your own
+
     * `hybrid-rt run stability` - the hard set: which technique answers wrongly on which case
 
     * `hybrid-rt run scaling --series triangles --triangles 2^10..2^20` - growth over one axis
 
     * `hybrid-rt run peers --quick` - the same rays and pictures through other programs
 
-    * `hybrid-rt run roofline --quick` - what the certified march reads, takes and may take
+    * `hybrid-rt run roofline --quick` - what the certified march takes, and its break-even
     """
     from hybrid_rt_bench.experiments import load_experiment
 
     spec = load_experiment(experiment, quick=quick)
     kind = kinds[spec.kind]
+    if given.get("depth") is not None and kind.frames:
+        spec = load_experiment(kind.frames, quick=quick)
+        kind = kinds[spec.kind]
     values = _values(kind, given)
     changes = {o.parameter: values[o.parameter] for o in _options(kind, values) if o.changes}
     picked = {o.parameter: values[o.parameter] for o in _options(kind, values) if not o.changes}
@@ -89,11 +94,12 @@ def run(
         "broken": list(outcome.broken),
     }
     if outcome.measured:
-        from hybrid_rt_bench.runs import read_run
+        from hybrid_rt_bench.runs import read_run, verdict_of
 
         data = read_run(outcome.folder, out_dir)
         written = rendered(data, show=not as_json)
         summary |= {
+            "verdict": verdict_of(data),
             "notes": data.meta["notes"],
             "warnings": data.meta["warnings"],
             "results": _records(data),
@@ -115,7 +121,7 @@ def add_to(app: typer.Typer) -> None:
             inspect.Parameter.KEYWORD_ONLY,
             default=None,
             annotation=Annotated[
-                int | None if option.number else str | None,
+                (str if option.type is list else option.type) | None,
                 typer.Option(f"--{option.name}", help=_help(option)),
             ],
         )
@@ -141,7 +147,7 @@ def _options(kind: Kind, values: dict[str, Any]) -> list[Option]:
     return [option for option in kind.options if option.parameter in values]
 
 
-def _values(kind: Kind, given: dict[str, str | int | None]) -> dict[str, Any]:
+def _values(kind: Kind, given: dict[str, str | float | None]) -> dict[str, Any]:
     """Return the values of the options that were given.
 
     Raises
@@ -158,11 +164,12 @@ def _values(kind: Kind, given: dict[str, str | int | None]) -> dict[str, Any]:
             continue
         if name not in known:
             flag = f"--{name.replace('_', '-')}"
-            has = ", ".join(f"--{option.name}" for option in kind.options) or "none of them"
+            names_of = [f"--{option.name}" for option in kind.options]
+            has = ", ".join(names_of + ["--depth"] * bool(kind.frames)) or "none of them"
             raise ArgumentError(flag, f"an option that kind {kind.name!r} has ({has})", flag)
         flag = f"--{known[name].name}"
-        if isinstance(value, str):
-            found[name] = names(flag, value)
+        if known[name].type is list:
+            found[name] = names(flag, str(value))
             if name == "resolutions":
                 found[name] = [Resolution.parse(flag, text) for text in found[name]]
         else:
@@ -171,7 +178,7 @@ def _values(kind: Kind, given: dict[str, str | int | None]) -> dict[str, Any]:
 
 
 def _measured(
-    kind: Kind, spec: AnyExperiment, threads: int | None, out: Path, picks: dict[str, list[str]]
+    kind: Kind, spec: AnyExperiment, threads: int | None, out: Path, picks: dict[str, Any]
 ) -> Outcome:
     from hybrid_rt_bench.measure.progress import Reporter
 

@@ -79,14 +79,40 @@ class Signals:
 signals = Signals()
 
 
+WIDE = 160
+"""Signs in a line of stdout where it is no terminal and nobody says how many there are."""
+
+NARROWEST = 20
+"""Fewer signs in a line than this are not taken for a width."""
+
+
 def out() -> Console:
-    """Return the console of stdout, which is wide where it is no terminal."""
-    return Console(width=None if sys.stdout.isatty() else 160, markup=False, emoji=False)
+    """Return the console of stdout: as wide as COLUMNS says, else as its terminal, else wide."""
+    width = asked_width()
+    if width is None and not sys.stdout.isatty():
+        width = WIDE
+    return Console(width=width, markup=False, emoji=False, _environ=_others())
 
 
 def err() -> Console:
-    """Return the console of stderr."""
-    return Console(stderr=True, markup=False, emoji=False, highlight=False)
+    """Return the console of stderr, as wide as COLUMNS says, else as its terminal."""
+    return Console(
+        width=asked_width(), stderr=True, markup=False, emoji=False, highlight=False,
+        _environ=_others(),
+    )  # fmt: skip
+
+
+def _others() -> dict[str, str]:
+    """Return the environment without COLUMNS, of which Rich takes what is no width."""
+    return {name: value for name, value in os.environ.items() if name != "COLUMNS"}
+
+
+def asked_width() -> int | None:
+    """Return the width that the environment variable COLUMNS says; None for nothing usable."""
+    text = os.environ.get("COLUMNS", "").strip()
+    if not (text.isascii() and text.isdigit()) or len(text) > 6:
+        return None
+    return int(text) if int(text) >= NARROWEST else None
 
 
 @contextlib.contextmanager

@@ -64,25 +64,39 @@ SCHEMA = Schema(
         count("rays", "Rays of the cell"),
         count("resolved", "Rays that the screen answers", better="higher"),
         *(
-            count(f"{prefix}{name}", f"Of {whom}: {name.replace('_', ' ')}", better="lower")
+            count(
+                f"{prefix}{name}",
+                f"Number of {whom}: {name.replace('_', ' ')}",
+                better="lower" if name in STRICT else "",
+            )
             for prefix, whom in (("", "the resolved rays"), ("all_", "all rays of the hybrid"))
             for name in VERDICTS
         ),
         Column("alpha", "Share of rays that the screen answers", better="higher"),
-        Column("wrong_rate", "Share of false hits and misses, of resolved rays", better="lower"),
+        Column(
+            "wrong_rate", "Share of false hits and misses among the resolved rays", better="lower"
+        ),
         Column("wrong_low", "Lower end of the 95 % interval of wrong_rate"),
         Column("wrong_high", "Upper end of the 95 % interval of wrong_rate"),
         *(
             Column(name, f"Error of t over the true t of claimed hits, {name[8:]}", better="lower")
             for name in T_ERRORS
         ),
-        Column("steps", "Samples of the screen, of all rays together", better="lower"),
-        Column("prepare_ms", "Making what the march reads, once a view", "ms", "lower"),
+        Column("steps", "Samples of the screen, all rays together", better="lower"),
+        Column("prepare_ms", "Making what the march reads, once per view", "ms", "lower"),
         Column("prepare_mib", "Memory of what the march reads", "MiB", "lower"),
         Column("lists_mib", "Memory of the lists of primitives in it", "MiB", "lower"),
-        Column("tests", "Exact tests, of all rays together", better="lower"),
-        Column("flip", "FLIP error of the image of the reflections", "", "lower", optional=True),
-        Column("rmse", "Root of its mean squared error", "", "lower", optional=True),
+        Column("tests", "Exact tests, all rays together", better="lower"),
+        Column(
+            "flip", "FLIP error of the image of the reflections, 0 to 1", "", "lower", optional=True
+        ),
+        Column(
+            "rmse",
+            "Root of the mean squared error of that image, 0 to 1",
+            "",
+            "lower",
+            optional=True,
+        ),
         flag("timed", "Whether it was timed"),
         *(
             Column(f"{stage}_ms", f"Median time: {label}", "ms", "lower")
@@ -97,12 +111,12 @@ SCHEMA = Schema(
     samples=(
         *_POINT,
         count("round", "Number of the round"),
-        Column("embree", "The strongest Embree beside it, every ray", "s", "lower"),
+        Column("embree", "Time of the strongest Embree beside it, every ray", "s", "lower"),
         *(
             Column(stage, f"Time of {stage}", "s", "lower", optional=True)
             for stage in HYBRID_STAGES
         ),
-        Column("hybrid", "The hybrid's four stages; of Embree, the whole", "s", "lower"),
+        Column("hybrid", "Time of the hybrid's four stages; of Embree, the whole", "s", "lower"),
     ),
     verdicts=(
         *_POINT,

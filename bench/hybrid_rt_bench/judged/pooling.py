@@ -60,13 +60,18 @@ class Pooled:
         return Rate.of(count, self.rays if of_all else self.resolved)
 
     @property
+    def tests_per_ray(self) -> float:
+        """Exact tests per ray; NaN where there are no rays."""
+        return float(self.rows["tests"].sum()) / self.rays if self.rays else float("nan")
+
+    @property
     def steps_per_ray(self) -> float:
-        """Samples of the screen that a ray takes; NaN where nothing marches."""
+        """Samples of the screen per ray; NaN where nothing marches."""
         steps = self.rows["steps"].sum(min_count=1)
         return float(steps) / self.rays if self.rays else float("nan")
 
     def per_second(self, column: str) -> float:
-        """Return millions of rays a second, by a column of milliseconds; NaN if nothing is timed.
+        """Return millions of rays per second, by a column of milliseconds; NaN if nothing is timed.
 
         Of all timed rows together: their rays over the sum of their times.
         """
@@ -75,7 +80,7 @@ class Pooled:
         return float(timed["rays"].sum()) / milliseconds / 1e3 if milliseconds else float("nan")
 
     def nanoseconds(self, column: str) -> float:
-        """Return nanoseconds a ray, by a column of milliseconds; NaN if nothing is timed."""
+        """Return nanoseconds per ray, by a column of milliseconds; NaN if nothing is timed."""
         return 1e3 / self.per_second(column)
 
     def median(self, column: str) -> float:
@@ -114,11 +119,13 @@ class Pooled:
 
     def free_march(self, samples: pd.DataFrame) -> stats.Estimate | None:
         """Return `speedup` as it would be if the march took no time: the most that it can be."""
-        rest = samples.assign(rest=samples["hybrid"] - samples["march"])
-        return self.ratio(rest, "embree", "rest")
+        if samples.empty:
+            return None
+        others = samples.assign(others=samples["hybrid"] - samples["march"])
+        return self.ratio(others, "embree", "others")
 
-    def may_cost(self, samples: pd.DataFrame) -> float:
-        """Return what the march may cost, ns a ray, for the hybrid to break even.
+    def break_even_ns(self, samples: pd.DataFrame) -> float:
+        """Return the march time at which the hybrid breaks even, ns per ray.
 
         The time of Embree tracing every ray, less that of the hybrid without its march, each beside
         the other: the median over rounds, added up over rows. Below 0, no march is fast enough; NaN

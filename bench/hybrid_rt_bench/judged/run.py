@@ -238,11 +238,17 @@ def _said(results: list[dict[str, Any]], cell: PlannedCell) -> str:
     """Return what is said of a finished cell on a console without a bar."""
     shown = [row for row in results if row["default"] and row["technique"] != EMBREE]
     parts = [
-        f"{row['technique']} alpha {row['alpha']:.3f} wrong {100 * row['wrong_rate']:.3g} %"
-        + (f" speed-up {row['speedup']:.2f}" if cell.timed else "")
+        f"{row['technique']} alpha {row['alpha']:.3f}, {_wrong(row)}"
+        + (f", speed-up {row['speedup']:.2f}" if cell.timed else "")
         for row in shown
     ]
-    return ": " + ", ".join(parts)
+    return ": " + "; ".join(parts)
+
+
+def _wrong(row: dict[str, Any]) -> str:
+    if not row["resolved"]:
+        return "no ray resolved"
+    return f"{100 * row['wrong_rate']:.3g} % of resolved rays wrong"
 
 
 def stages_to_compile(

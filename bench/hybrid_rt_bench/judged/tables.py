@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
 
 import pandas as pd
 
 from hybrid_rt.judging.rate import Rate
 from hybrid_rt_bench.judged.columns import CELL, EMBREE, POINT, STRICT, WRONG
 from hybrid_rt_bench.judged.pooling import Pooled, pools
-from hybrid_rt_bench.report.table import Table, interval, number
-from hybrid_rt_bench.results import statistics as stats
+from hybrid_rt_bench.judged.text import (
+    SPEEDUP_NOTE,
+    cells_text,
+    full_name,
+    pays,
+    plain,
+    point_name,
+    power,
+    share,
+    speedup_text,
+)
+from hybrid_rt_bench.report.scenes import scene_name
+from hybrid_rt_bench.report.table import ABSENT, DASH, Table, number, rate_text
 from hybrid_rt_bench.results.folder import RunData
-
-STRICT_NOTE = (
-    "Wrong: false hits, false misses and wrong primitives together, among the rays that the "
-    "screen answers [95 % upper bound of their rate; 3 / N if none was seen]."
-)
-BOUND_NOTES = (
-    "If the march took no time: the speed-up without T(march) in it, the most that any march "
-    "which answers the same rays could reach.",
-    "May cost: the march at which the hybrid would break even, (T(strongest Embree, every ray) "
-    "- T(compaction) - T(fallback) - T(merge)) / rays, of the same runs. Below 0, what is left "
-    "for Embree takes longer than all rays did: no march is fast enough.",
-)
-"""What `Pooled.free_march` and `Pooled.may_cost` are, under the tables that show them."""
 
 
 def table_main(run: RunData) -> Table:
@@ -32,35 +30,33 @@ def table_main(run: RunData) -> Table:
     table = Table(
         "Speed against error",
         [
-            "", "alpha", "wrong, % of answers", "wrong primitive, %", "wrong, % of all rays",
-            "march, Mrays/s", "steps a ray", "speed-up, measured",
+            "", "alpha", "wrong, % of resolved rays", "wrong, % of all rays", "march, Mrays/s",
+            "speed-up, measured", "wrong primitive, % of resolved rays", "steps per ray",
         ],
     )  # fmt: skip
     rows = shared(run)
-    samples = run.samples
     for (technique, point), pooled in pools(rows, POINT).items():
         table.rows.append(
             [
                 full_name(technique, point, pooled),
                 share(pooled),
                 rate_text(pooled.rate(WRONG)),
-                percent_text(pooled.rate("wrong_primitive")),
                 rate_text(pooled.rate(WRONG, of_all=True)),
                 number(march_rate(technique, pooled)),
+                speedup_text(pooled.speedup(run.samples)),
+                rate_text(pooled.rate("wrong_primitive")),
                 number(pooled.steps_per_ray),
-                speedup_text(pooled.speedup(samples)),
             ]
         )
     table.notes += [
-        f"{cells_text(rows)}. Answers: the rays that the screen resolves; alpha is their share.",
+        f"{cells_text(rows)}. Resolved rays: those that the screen answers; alpha is their share.",
         "Wrong: a false hit or a false miss, more than a pixel from the truth. Wrong primitive: "
         "another triangle than the true one, within a pixel. All rays: of the hybrid with robust "
         "Embree as its fallback, so that an error of the hand-over is counted.",
-        "[95 % interval: Clopper-Pearson for shares of rays, as if each were drawn by itself; "
-        "bootstrap over rounds for speed-ups]. None seen among N rays: at most 3 / N.",
-        "Speed-up: T(strongest Embree, every ray) / T(march + compaction + fallback + merge), run "
-        "side by side; geometric mean over cells of the median over rounds. The raster and what is "
-        "built from it are not in it: see 'When does it pay'.",
+        "[95 % interval: Clopper-Pearson for shares of rays, as if each were drawn by itself]. "
+        "None seen among N rays: at most 3 / N.",
+        f"{SPEEDUP_NOTE} The raster and what is built from it are not in it: see 'When does it "
+        "pay'.",
         "embree robust is what everything else is judged against; counted as wrong is where a "
         "float64 judge found it so, looking only where a technique disagreed with it.",
     ]
@@ -72,15 +68,17 @@ def table_scenes(run: RunData) -> Table:
     table = Table(
         "Speed against error, scene by scene",
         [
-            "", "alpha", "wrong, % of answers", "wrong, % of all rays", "march, Mrays/s",
+            "", "alpha", "wrong, % of resolved rays", "wrong, % of all rays", "march, Mrays/s",
             "speed-up, measured",
         ],
         detail=True,
     )  # fmt: skip
     rows = defaults(shared(run))
+    names = _names(rows)
     for (scene,), part in pools(rows, ["scene"]).items():
-        table.rows.append([scene])
-        for (technique, point), pooled in pools(part.rows, POINT).items():
+        table.rows.append([scene_name(run, scene)])
+        found = pools(part.rows, POINT)
+        for (technique, point), pooled in found.items():
             table.rows.append(
                 [
                     point_name(technique, point),
@@ -91,6 +89,7 @@ def table_scenes(run: RunData) -> Table:
                     speedup_text(pooled.speedup(run.samples)),
                 ]
             )
+        table.rows += _lacking(table, names, found)
     table.notes.append("Default parameters of each technique; otherwise as the table before.")
     return table
 
@@ -100,16 +99,17 @@ def table_workloads(run: RunData) -> Table:
     table = Table(
         "When does it pay",
         [
-            "", "alpha", "wrong, % of answers", "speed-up, measured", "pays",
-            "strongest Embree, Mrays/s", "data for the march, ms a view",
+            "", "alpha", "wrong, % of resolved rays", "speed-up, measured", "pays",
+            "strongest Embree, Mrays/s", "data for the march, ms per view",
         ],
     )  # fmt: skip
     rows = defaults(timed(run))
+    rows = rows[rows["technique"] != EMBREE]
+    names = _names(rows)
     for (workload,), part in pools(rows, ["workload"]).items():
-        table.rows.append([workload])
-        for (technique, point), pooled in pools(part.rows, POINT).items():
-            if technique == EMBREE:
-                continue
+        table.rows.append([f"{plain(workload)} rays"])
+        found = pools(common(part.rows), POINT)
+        for (technique, point), pooled in found.items():
             speedup = pooled.speedup(run.samples)
             table.rows.append(
                 [
@@ -122,10 +122,11 @@ def table_workloads(run: RunData) -> Table:
                     number(pooled.mean("prepare_ms")),
                 ]
             )
+        table.rows += _lacking(table, names, found)
     table.notes += [
         f"Default parameters of each technique. {cells_text(rows)}.",
         "Pays: the interval of the speed-up lies above 1. Data for the march: pyramids, and lists "
-        "of primitives if any, made once a view and not counted in the speed-up.",
+        "of primitives if any, made once per view and not counted in the speed-up.",
     ]
     return table
 
@@ -135,24 +136,20 @@ def table_counts(run: RunData) -> Table:
     table = Table(
         "All rays that were judged",
         [
-            "", "rays", "answers", *(_words(name) for name in STRICT), "rate of all three",
-            "at most", "rate of all rays of the hybrid", "at most",
+            "", "rays", "resolved rays", *(plain(name) for name in STRICT),
+            "all three, share of resolved rays", "all three, share of all rays of the hybrid",
         ],
     )  # fmt: skip
-    rows = run.results[run.results.technique != EMBREE]
-    rows = defaults(rows)
-    for (technique, point), pooled in pools(rows, POINT).items():
-        mine, of_all = pooled.rate(STRICT), pooled.rate(STRICT, of_all=True)
+    rows = defaults(run.results[run.results.technique != EMBREE])
+    for (technique,), pooled in pools(rows, ["technique"]).items():
         table.rows.append(
             [
-                point_name(technique, point),
+                technique,
                 f"{pooled.rays:,}",
                 f"{pooled.resolved:,}",
                 *(f"{pooled.rate(name).count:,}" for name in STRICT),
-                _power(mine.value),
-                f"{_power(mine.high)}",
-                _power(of_all.value),
-                f"{_power(of_all.high)}",
+                _bounded(pooled.rate(STRICT)),
+                _bounded(pooled.rate(STRICT, of_all=True)),
             ]
         )
     table.notes.append(
@@ -165,26 +162,25 @@ def table_counts(run: RunData) -> Table:
 def table_lists(run: RunData) -> list[Table]:
     """Return what longer lists of primitives answer and cost, if there is more than one length."""
     rows = run.results
-    rows = rows[
-        (rows["lists_mib"] > 0) & rows["timed"] & (rows["workload"] == rows["workload"].iloc[0])
-    ]
+    rows = rows[(rows["lists_mib"] > 0) & rows["timed"] & (rows["workload"] == _first(run))]
     if rows["point"].nunique() < 2:
         return []
     table = Table(
         "How long a list of primitives pays",
         [
-            "", "alpha, mean of cameras", "exact tests a ray", "steps a ray", "lists, MiB a view",
-            "making them, ms a view", "march, Mrays/s", "speed-up, measured",
+            "", "alpha, mean of cameras", "exact tests per ray", "steps per ray",
+            "lists, MiB per view", "making them, ms per view", "march, Mrays/s",
+            "speed-up, measured",
         ],
     )  # fmt: skip
     for (scene,), part in pools(rows, ["scene"]).items():
-        table.rows.append([scene])
-        for (technique, point), pooled in pools(part.rows, POINT).items():
+        table.rows.append([scene_name(run, scene)])
+        for (technique, point), pooled in pools(common(part.rows), POINT).items():
             table.rows.append(
                 [
-                    point,
+                    f"{technique}, {point}",
                     number(pooled.mean("alpha")),
-                    number(pooled.rows["tests"].sum() / pooled.rays),
+                    number(pooled.tests_per_ray),
                     number(pooled.steps_per_ray),
                     number(pooled.mean("lists_mib")),
                     number(pooled.mean("prepare_ms")),
@@ -193,8 +189,9 @@ def table_lists(run: RunData) -> list[Table]:
                 ]
             )
     table.notes += [
-        f"{cells_text(rows)}. A list takes 8 bytes a primitive and 4 for the bound of the rest, "
-        "for every pixel, full or not; what does not fit makes rays unresolved, never wrong.",
+        f"{cells_text(rows)}. A list takes 8 bytes for each primitive, and 4 for the bound of "
+        "those that it has no place for, for every pixel, full or not; what does not fit leaves "
+        "rays unresolved, never wrong.",
         "Making them: the lists and the conservative pyramid.",
     ]
     return [table]
@@ -203,25 +200,33 @@ def table_lists(run: RunData) -> list[Table]:
 def table_cameras(run: RunData) -> Table:
     """Return the alpha of every technique's default point at each camera's largest resolution."""
     rows = defaults(run.results)
-    rows = rows[(rows["workload"] == rows["workload"].iloc[0]) & (rows["technique"] != EMBREE)]
+    rows = rows[(rows["workload"] == _first(run)) & (rows["technique"] != EMBREE)]
     rows = rows[rows["height"] == rows.groupby(["scene", "camera"])["height"].transform("max")]
-    names = list(dict.fromkeys(rows["technique"]))
+    names = _names(rows)
     table = Table("Alpha, camera by camera", ["", *names], detail=True)
     for (scene,), part in pools(rows, ["scene"]).items():
         cameras = part.rows.pivot_table("alpha", "camera", "technique", sort=False)
-        table.rows.append([scene])
+        cameras = cameras.reindex(columns=names)
+        table.rows.append([scene_name(run, scene)])
         for camera, alphas in cameras.iterrows():
-            table.rows.append([str(camera), *(number(float(alphas[name])) for name in names)])
-        means = cameras.mean()
-        table.rows.append([f"{scene}, mean", *(number(float(means[name])) for name in names)])
-    table.notes.append(f"{_words(rows['workload'].iloc[0])} rays, default parameters.")
+            table.rows.append([str(camera), *(_alpha(float(alphas[name])) for name in names)])
+        # Of the cameras that every technique of the scene has.
+        means = cameras.dropna(axis="columns", how="all").dropna().mean().reindex(names)
+        table.rows.append(["mean", *(_alpha(float(means[name])) for name in names)])
+    table.notes.append(
+        f"{plain(_first(run))} rays, default parameters, at the largest size of each camera. Mean: "
+        "of the cameras that every technique of the scene was measured with."
+    )
     return table
 
 
 def table_status(run: RunData) -> Table:
     """Return how the marches of each technique ended and how often each ending was wrong."""
     table = Table(
-        "How the marches ended, %", ["", "of all rays", "of them answered", "wrong, of answers"],
+        "How the marches ended",
+        [
+            "", "rays, % of all rays", "resolved, % of these rays", "wrong, % of those resolved",
+        ],
         detail=True,
     )  # fmt: skip
     rows = defaults(shared(run))
@@ -239,9 +244,10 @@ def table_status(run: RunData) -> Table:
                     str(status).lower(),
                     number(100 * whole / total),
                     number(100 * answered / whole),
-                    rate_text(Rate.of(wrong, answered)) if answered else "–",
+                    rate_text(Rate.of(wrong, answered)),
                 ]
             )
+    table.notes.append("Wrong: false hits and false misses, with their 95 % interval.")
     return table
 
 
@@ -257,14 +263,14 @@ def table_t_error(run: RunData) -> Table:
             table.rows.append(
                 [
                     full_name(technique, point, pooled),
-                    _power(pooled.median("error_t_p50")),
-                    _power(pooled.median("error_t_p99")),
-                    _power(pooled.largest("error_t_p99")),
-                    _power(pooled.largest("error_t_max")),
+                    power(pooled.median("error_t_p50")),
+                    power(pooled.median("error_t_p99")),
+                    power(pooled.largest("error_t_p99")),
+                    power(pooled.largest("error_t_max")),
                 ]
             )
     table.notes.append(
-        "Of answers whose ray truly hits something: p50 and p99 of every 8th ray; the largest of "
+        "Of resolved rays that truly hit something: p50 and p99 of every 8th ray; the largest of "
         "these and of all that differ from the reference. Float32 has 6e-8."
     )
     return table
@@ -288,15 +294,20 @@ def table_image(run: RunData) -> list[Table]:
             ]
         )
     table.notes.append(
-        f"{len(rows[[*CELL]].drop_duplicates())} views, 0 to 1. What the screen does not answer is "
-        "traced, so an image errs only by what a technique claims."
+        f"{len(rows[[*CELL]].drop_duplicates())} views; 0: the same image, 1: the largest "
+        "difference. What the screen does not answer is traced, so an image errs only by what a "
+        "technique claims."
     )
     return [table]
 
 
 def shared(run: RunData) -> pd.DataFrame:
     """Return the rows of the timed cells in which every point was measured."""
-    rows = timed(run)
+    return common(timed(run))
+
+
+def common(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of the cells that have every point of `rows`; all rows if none has."""
     points = rows.groupby(list(POINT), sort=False).ngroups
     of_cell = rows.groupby(list(CELL))["technique"].transform("size")
     whole = rows[of_cell == points]
@@ -318,74 +329,26 @@ def march_rate(technique: str, pooled: Pooled) -> float:
     return pooled.per_second("hybrid_ms" if technique == EMBREE else "march_ms")
 
 
-def point_name(technique: str, point: str) -> str:
-    """Return what one of the defaults is called; Embree has two."""
-    return f"{technique}, {point}" if technique == EMBREE else technique
+def _first(run: RunData) -> str:
+    return str(run.results["workload"].iloc[0])
 
 
-def full_name(technique: str, point: str, pooled: Pooled) -> str:
-    """Return what a point is called among all the points of its technique."""
-    if technique == EMBREE:
-        return f"{technique}, {point}"
-    chosen = bool(pooled.rows.default.iloc[0])
-    return f"{technique}, {point}" + (" (default)" if chosen and point != "default" else "")
+def _names(rows: pd.DataFrame) -> list[str]:
+    return [str(name) for name in dict.fromkeys(rows["technique"])]
 
 
-def share(pooled: Pooled) -> str:
-    """Return alpha."""
-    return f"{pooled.alpha:.3f}"
+def _lacking(
+    table: Table, names: Iterable[str], found: Iterable[tuple[str, ...]]
+) -> list[list[str]]:
+    """Return a row for each technique that was not measured where others were."""
+    there = {technique for technique, *_ in found}
+    width = len(table.columns) - 1
+    return [[name, *[ABSENT] * width] for name in names if name not in there]
 
 
-def count_text(rate: Rate) -> str:
-    """Return how many rays were counted, and the upper end of the interval of their rate."""
-    return f"{rate.count:,} [at most {_power(rate.high)}]" if rate.total else "–"
+def _alpha(value: float) -> str:
+    return ABSENT if value != value else f"{value:.3f}"
 
 
-def rate_text(rate: Rate) -> str:
-    """Return a rate in per cent with its interval; a zero stays a zero, with its bound."""
-    if rate.total == 0:
-        return "–"
-    low, high = number(100 * rate.low, 2), number(100 * rate.high, 2)
-    if rate.count == 0:
-        return f"0 [at most {high}]"
-    return f"{number(100 * rate.value)} [{low}, {high}]"
-
-
-def percent_text(rate: Rate) -> str:
-    """Return a rate in per cent."""
-    return number(100 * rate.value)
-
-
-def speedup_text(speedup: stats.Estimate | None) -> str:
-    """Return a speed-up with its interval."""
-    return "–" if speedup is None else interval(speedup.value, speedup.low, speedup.high)
-
-
-def pays(speedup: stats.Estimate | None) -> str:
-    """Return on which side of 1 the interval of a speed-up lies."""
-    if speedup is None:
-        return "–"
-    return "yes" if speedup.low > 1 else "no" if speedup.high < 1 else "break-even"
-
-
-def _power(value: float) -> str:
-    """Return a small number with two digits and an exponent; zero and one as they are."""
-    if value != value:
-        return "–"
-    return f"{value:.1e}" if 0 < value < 0.01 else number(value, 2)
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
-
-
-def cells_text(rows: pd.DataFrame) -> str:
-    """Return which cells rows are of, in words."""
-
-    def listed(column: str) -> str:
-        return ", ".join(str(value) for value in dict.fromkeys(rows[column]))
-
-    cells: Any = rows[[*CELL]].drop_duplicates()
-    sizes = dict.fromkeys(f"{w}x{h}" for w, h in zip(cells.width, cells.height, strict=True))
-    count = f"{len(cells)} cell" + ("s" if len(cells) != 1 else "")
-    return f"{count}: {listed('scene')}; {listed('workload')} rays; {', '.join(sizes)}"
+def _bounded(rate: Rate) -> str:
+    return f"{power(rate.value)} [at most {power(rate.high)}]" if rate.total else DASH

@@ -74,7 +74,8 @@ class SceneEntry(BaseModel):
     name : str
         A registered scene, or a path to a mesh file.
     row : str
-        The row of the paper's tables that it stands beside; empty for none.
+        The row of the paper's tables that it stands beside; empty for none. It is left empty for
+        what stands in for the scene.
     stand_in : str, optional
         Built-in scene that takes its place where its files are absent.
     size : int, optional
@@ -147,6 +148,6 @@ class SceneExperiment(AnyExperiment):
     def row_of(self, scene: str) -> str:
         """Return the paper's row for a scene given by name on the command line."""
         for entry in self.scenes:
-            if scene in (entry.name, entry.stand_in):
+            if scene == entry.name:
                 return entry.row
         return ""

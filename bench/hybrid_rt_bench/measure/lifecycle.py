@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numba
 
 import hybrid_rt as hrt
+import hybrid_rt_scenes as hrs
 from hybrid_rt_bench.measure import compiling, memory
 from hybrid_rt_bench.measure import environment as env
 from hybrid_rt_bench.measure.errors import reason_of
@@ -109,10 +110,8 @@ class Session:
         """Note in the run a scene that was loaded, and what its structures took to build."""
         self.writer.meta["scenes"].append(
             {
-                "name": planned.name,
-                "title": planned.spec.title,
+                **described(planned.spec, planned.name),
                 "row": planned.row,
-                "builtin": planned.spec.builtin,
                 "triangles": len(scene),
                 "zero_area": scene.zero_area,
                 "build_seconds": build_seconds,
@@ -188,15 +187,16 @@ class Request:
         Directory of the run's folder.
     command : sequence of str
         The command line, to be kept.
-    picks : mapping of str to sequence of str
-        What stands in place of the experiment's, by option: "scenes", "cameras", "cases".
+    picks : mapping of str to value
+        What stands in place of the experiment's, by option: names for "scenes", "cameras", "cases",
+        the path of "depth".
     """
 
     reporter: Reporter
     threads: int | None = None
     out: Path = Path("reports")
     command: Sequence[str] = ()
-    picks: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    picks: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def workers(self) -> int:
@@ -282,6 +282,17 @@ def carry_out(
             writer.finish()
     interrupted = bool(writer.meta["interrupted"])
     return Outcome(writer.folder, writer.measured, len(writer.failed), interrupted)
+
+
+def described(spec: hrs.SceneSpec, name: str) -> dict[str, Any]:
+    """Return what a run says of a scene, called `name` in its results, before it is loaded."""
+    return {
+        "name": name,
+        "title": spec.title,
+        "builtin": spec.builtin,
+        "mark": spec.mark,
+        "note": spec.note,
+    }
 
 
 def cell_keys(scene: str, camera: str, resolution: Resolution | None) -> dict[str, Any]:

@@ -1,8 +1,8 @@
 """Keep freed memory in the process, so that timed stages reuse it; say how much it has.
 
 Every call of the library returns fresh arrays. The C library hands large blocks back to the system
-when they are freed, and the system gives zeroed pages again one fault at a time: at 3840x2160 that
-took two thirds of the merge and a third of tracing. A renderer keeps its buffers from frame to
+when they are freed, and the system gives zeroed pages again one fault at a time: for large pictures
+that is much of the merge, and no small part of tracing. A renderer keeps its buffers from frame to
 frame, so it is not a cost of any technique, and it would hide what is measured.
 """
 

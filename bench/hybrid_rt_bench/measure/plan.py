@@ -8,6 +8,7 @@ from pathlib import Path
 
 import hybrid_rt as hrt
 import hybrid_rt_scenes as hrs
+from hybrid_rt_bench.measure import viewpoints
 from hybrid_rt_bench.measure.errors import NothingToRunError
 from hybrid_rt_bench.measure.experiment import SceneEntry, SceneExperiment
 
@@ -20,7 +21,7 @@ class PlannedScene:
     ----------
     spec : SceneSpec
     row : str
-        The row of the paper's tables that it stands beside.
+        The row of the paper's tables that it stands beside; empty for one that stands in.
     cameras : tuple of str
     size : int or None
         Triangles asked of a built-in scene.
@@ -71,9 +72,10 @@ def make_plan(
     ----------
     experiment : SceneExperiment
     scenes : sequence of str, optional
-        Names or paths of mesh files, in place of the experiment's scenes.
+        Names, or paths of mesh files or definitions, in place of the experiment's scenes.
     cameras : sequence of str, optional
-        Names; every scene takes those that it has. Default: all (the first few in quick form).
+        Names; every scene takes those that it has. Or files of cameras, ``FILE`` or ``FILE:NAME``:
+        every scene takes those. Default: all (the first few in quick form).
 
     Raises
     ------
@@ -85,6 +87,7 @@ def make_plan(
         Every scene is missing.
     """
     plan = Plan()
+    cameras, given = _given_cameras(cameras)
     for entry in _entries(experiment, scenes):
         try:
             spec = _available(entry, plan, allow_stand_in=scenes is None)
@@ -94,8 +97,12 @@ def make_plan(
             plan.unreadable.append((entry.name, str(error)))
             continue
         if spec is not None:
+            if given:
+                spec = _with_cameras(spec, given)
             names = _camera_names(entry, spec, experiment, cameras)
-            planned = PlannedScene(spec, entry.row, names, entry.size)
+            # What stands in for a scene of the paper is not to be held against the paper.
+            row = entry.row if spec.name == entry.name else ""
+            planned = PlannedScene(spec, row, names, entry.size)
             if planned.name in [scene.name for scene in plan.scenes]:  # it stands in for two
                 plan.notes.append(f"scene {planned.name!r} is measured only once")
             else:
@@ -108,10 +115,35 @@ def make_plan(
 
 
 def find_scene(name: str) -> hrs.SceneSpec:
-    """Return a scene by its registered name, or from the path of a mesh file."""
+    """Return a scene by its registered name, or from the path of a mesh file or a definition."""
     if name not in hrs.scene_names() and ("/" in name or Path(name).suffix or Path(name).is_file()):
         return hrs.scene_from_path(name)
     return hrs.get_scene(name)
+
+
+def _given_cameras(
+    cameras: Sequence[str] | None,
+) -> tuple[list[str] | None, dict[str, hrs.CameraSpec]]:
+    """Return names of cameras, and the views of those that come from files, by these names."""
+    if cameras is None:
+        return None, {}
+    found: dict[str, hrt.Camera] = {}
+    names: list[str] = []
+    for text in cameras:
+        if not viewpoints.is_file(text):
+            names.append(text)
+            continue
+        for name, camera in viewpoints.cameras_in("--cameras", text).items():
+            if name in found:
+                raise hrt.ArgumentError("--cameras", "cameras of different names", repr(name))
+            found[name] = camera
+    given = hrs.given_cameras(found)
+    return [*names, *given], given
+
+
+def _with_cameras(spec: hrs.SceneSpec, given: dict[str, hrs.CameraSpec]) -> hrs.SceneSpec:
+    """Return a scene with more cameras; one of the same name gives way."""
+    return spec.model_copy(update={"cameras": {**spec.cameras, **given}})
 
 
 def _entries(experiment: SceneExperiment, scenes: Sequence[str] | None) -> list[SceneEntry]:

@@ -63,7 +63,7 @@ def shaded(gbuffer: hrt.GBuffer, rays: hrt.Rays, tracer: hrt.EmbreeTracer, sampl
         hemisphere = 0.75 + 0.25 * n_ray[:, 1]
         ambient = (open_sky * (0.56 * hemisphere + 0.18 * head))[:, None]
         sun = (0.66 * lit)[:, None]
-        tint = _tints(gbuffer.scene.object_id[gbuffer.prim_id[y, x]])
+        tint = _tints(gbuffer.known_scene.object_id[gbuffer.prim_id[y, x]])
         image[y, x] = tint * (ambient * COOL + sun * WARM)
     return _developed(image)
 
@@ -91,7 +91,7 @@ def reflection(gbuffer: hrt.GBuffer, rays: hrt.Rays, hits: hrt.Hits) -> F32:
     (H, W, 3) float32, sRGB in 0 to 1
         Where no ray starts, an even grey.
     """
-    scene = gbuffer.scene
+    scene = gbuffer.known_scene
     light = np.empty((len(rays), 3), np.float32)
     met = hits.prim_id >= 0
     length = np.linalg.norm(rays.direction, axis=1)
@@ -115,7 +115,7 @@ def _openness(
     """Return, for each pixel, the share of the hemisphere that is open within a short distance."""
     height, width = gbuffer.prim_id.shape
     x, y = rays.pixel[:, 0], rays.pixel[:, 1]
-    low, high = gbuffer.scene.bounds
+    low, high = gbuffer.known_scene.bounds
     reach = 0.08 * float(np.linalg.norm(high - low))
     side = np.where(np.abs(n[:, :1]) < 0.9, X, Y)
     tangent = np.cross(n, side)

@@ -45,7 +45,7 @@ class Choice:
     ----------
     best : Candidate
     nanoseconds : dict of float
-        Shortest time a ray, on the sample and on one thread, by label.
+        Shortest time per ray, on the sample and on one thread, by label.
     """
 
     best: Candidate

@@ -4,33 +4,36 @@ from __future__ import annotations
 
 from typing import Any
 
-from hybrid_rt_bench.report.table import Table
+from hybrid_rt_bench.report.page import bullets, paragraph
+from hybrid_rt_bench.report.table import Table, threads_text
 from hybrid_rt_bench.results.folder import RunData
 
 
-def document(run: RunData, tables: list[Table]) -> str:
-    """Return the text of ``tables.md``."""
+def document(run: RunData, tables: list[Table], verdict: str) -> str:
+    """Return the text of ``tables.md``: the verdict, what was measured where, the tables."""
     meta, machine = run.meta, run.meta["environment"]
     cells = [cell["state"] for cell in meta["cells"]]
-    lines = [
-        f"# {meta['spec']['title']}",
-        "",
+    parts = [f"# {meta['spec']['title']}", paragraph(f"**Verdict.** {verdict}")]
+    threads = threads_text(machine["threads"])
+    about = [
         f"Run `{run.name}`, started {meta['started']}"
         + ("" if meta["finished"] else ", **not finished: only some cells are here**")
         + ".",
-        f"{machine['cpu']}, {machine['threads']} threads, {machine['os']}; Embree "
+        f"{machine['cpu']}, {threads}, {machine['os']}; Embree "
         f"{machine['embree'].get('version', '?')}, Numba {machine['packages'].get('numba', '?')}; "
         f"commit {machine.get('git') or 'unknown'}.",
         f"Cells measured: {cells.count('measured')}, failed: {cells.count('failed')}.",
     ]
-    for title, texts in (("Notes", meta["notes"]), ("Warnings", meta["warnings"])):
+    parts.append(paragraph(" ".join(about)))
+    failed = [f"{_name(c)}: {c['error']}" for c in meta["cells"] if c["state"] == "failed"]
+    for title, texts in (
+        ("Notes", meta["notes"]),
+        ("Warnings", meta["warnings"]),
+        ("Failed", failed),
+    ):
         if texts:
-            lines += ["", f"{title}:", "", *[f"- {text}" for text in texts]]
-    failed = [cell for cell in meta["cells"] if cell["state"] == "failed"]
-    if failed:
-        lines += ["", "Failed:", ""]
-        lines += [f"- {_name(cell)}: {cell['error']}" for cell in failed]
-    return "\n".join(lines) + "\n\n" + "\n".join(table.markdown() for table in tables)
+            parts.append(f"{title}:\n\n{bullets(texts)}")
+    return "\n\n".join(parts) + "\n\n" + "\n".join(table.markdown() for table in tables)
 
 
 def _name(cell: dict[str, Any]) -> str:

@@ -6,7 +6,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from hybrid_rt_bench.report.markdown import document
+from hybrid_rt_bench.report.scenes import with_scene_notes
 from hybrid_rt_bench.report.table import Table
+from hybrid_rt_bench.report.verdict import Verdict, paragraph
 from hybrid_rt_bench.results.files import ReportsError, reason, write_bytes
 from hybrid_rt_bench.results.folder import RunData
 
@@ -15,7 +17,7 @@ Figures = Callable[[RunData, Path], list[Path]]
 
 
 def render_run(
-    run: RunData, tables: Tables, figures: Sequence[Figures] = ()
+    run: RunData, tables: Tables, verdict: Verdict, figures: Sequence[Figures] = ()
 ) -> tuple[list[Table], list[Path]]:
     """Write the tables and figures of a run.
 
@@ -24,6 +26,8 @@ def render_run(
     run : RunData
     tables : callable
         Returns the tables of a run, in the order of reading.
+    verdict : callable
+        Returns what the run comes to.
     figures : sequence of callable
         Each writes pictures of a run into a folder and returns their paths.
 
@@ -38,9 +42,9 @@ def render_run(
     ReportsError
         The run's folder cannot be written to.
     """
-    made = tables(run)
+    made = with_scene_notes(run, tables(run))
     written = [run.folder / "tables.md"]
-    write_bytes(written[0], document(run, made).encode())
+    write_bytes(written[0], document(run, made, paragraph(run, verdict)).encode())
     folder = run.folder / "figures"
     try:
         folder.mkdir(exist_ok=True)

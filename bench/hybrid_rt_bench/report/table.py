@@ -9,6 +9,18 @@ from dataclasses import dataclass, field
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from hybrid_rt.judging.rate import Rate
+from hybrid_rt_bench.report.page import bullets, table_text
+
+ABSENT = "not measured"
+"""What stands in a cell of which there is no measurement."""
+
+QUOTED = "the paper's"
+"""How a row begins that quotes the paper."""
+
+DASH = "–"
+"""What stands in a cell that has no meaning in its row."""
+
 
 @dataclass
 class Table:
@@ -25,6 +37,8 @@ class Table:
         Sentences printed beneath.
     detail : bool
         Whether a terminal that is too narrow may do without it.
+    sentences : bool
+        Whether the last column holds sentences: a document sets them as a list.
     """
 
     title: str
@@ -32,19 +46,22 @@ class Table:
     rows: list[list[str]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     detail: bool = False
+    sentences: bool = False
 
     def markdown(self) -> str:
-        """Return the table as GitHub-flavoured markdown."""
-        lines = [f"### {self.title}", ""]
-        lines.append("| " + " | ".join(_escape(c) for c in self.columns) + " |")
-        lines.append("|" + "|".join(["---"] + ["---:"] * (len(self.columns) - 1)) + "|")
-        for row in self.rows:
-            cells = [_escape(c) for c in row] if len(row) > 1 else [f"**{_escape(row[0])}**"]
-            cells += [""] * (len(self.columns) - len(cells))
-            lines.append("| " + " | ".join(cells) + " |")
+        """Return the table as GitHub-flavoured Markdown, no line of it wider than a page."""
+        parts = [f"### {self.title}"]
+        if not self.sentences:
+            parts.append(table_text(self.columns, self.rows).rstrip("\n"))
+        else:
+            if len(self.columns) > 2:
+                rows = [row[:-1] if len(row) > 1 else row for row in self.rows]
+                parts.append(table_text(self.columns[:-1], rows).rstrip("\n"))
+            parts.append(f"{self.columns[-1]}:")
+            parts.append(bullets([f"**{r[0]}**: {r[-1]}" for r in self.rows if len(r) > 1]))
         if self.notes:
-            lines += ["", *[f"{note}  " for note in self.notes]]
-        return "\n".join(lines) + "\n"
+            parts.append(bullets(self.notes))
+        return "\n\n".join(parts) + "\n"
 
     def rich(self) -> RichTable:
         """Return the table for a rich console."""
@@ -70,13 +87,13 @@ class Table:
 
 def paper(row: list[str]) -> bool:
     """Tell whether a row quotes the paper."""
-    return row[0].startswith("paper")
+    return row[0].startswith(QUOTED)
 
 
 def number(value: float, digits: int = 3) -> str:
     """Return `value` with that many significant digits and no exponent; a dash for NaN."""
     if not math.isfinite(value):
-        return "–"
+        return DASH
     if value == 0:
         return "0"
     decimals = digits - 1 - math.floor(math.log10(abs(value)))
@@ -93,15 +110,33 @@ def interval(value: float, low: float, high: float, digits: int = 3) -> str:
     return f"{number(value, digits)} [{number(low, digits)}, {number(high, digits)}]"
 
 
-def percent(value: float, low: float = math.nan, high: float = math.nan) -> str:
-    """Return a share in per cent with its interval if there is one; zero stays visible as 0 %."""
+def percent(value: float) -> str:
+    """Return a share in per cent; zero stays visible as 0 %."""
+    return f"{number(100 * value)} %" if math.isfinite(value) else DASH
+
+
+def share_text(value: float, low: float, high: float) -> str:
+    """Return a share in per cent, without the sign, with its interval.
+
+    A zero stays a zero, with its upper bound; NaN is a dash.
+    """
     if not math.isfinite(value):
-        return "–"
-    text = f"{number(100 * value)} %"
-    if math.isfinite(low) and math.isfinite(high):
-        text += f" [{number(100 * low)}, {number(100 * high)}]"
-    return text
+        return DASH
+    if value == 0:
+        return f"0 [at most {number(100 * high, 2)}]"
+    return f"{number(100 * value)} [{number(100 * low, 2)}, {number(100 * high, 2)}]"
 
 
-def _escape(text: str) -> str:
-    return text.replace("|", "\\|")
+def rate_text(rate: Rate) -> str:
+    """Return `share_text` of a rate."""
+    return share_text(rate.value, rate.low, rate.high)
+
+
+def rate_words(rate: Rate) -> str:
+    """Return a rate in a sentence: with its sign, none of how many where it is zero."""
+    if not rate.total:
+        return "none of no rays"
+    if not rate.count:
+        return f"none of {rate.total:,} rays [at most {number(100 * rate.high, 2)} %]"
+    bounds = f"[{number(100 * rate.low, 2)}, {number(100 * rate.high, 2)}]"
+    return f"{number(100 * rate.value)} % {bounds} of {rate.total:,} rays"

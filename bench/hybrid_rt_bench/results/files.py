@@ -3,6 +3,10 @@
 A file is written beside its place, flushed to the disk, and then given its name; the folder is
 flushed after that. What a killed program leaves is one hidden file, ``.NAME.part``, which `sweep`
 takes away once nobody writes the folder any more.
+
+Files that are only right together are written by `write_together`: all of them beside their places
+first. Then one renaming, of the last one to ``.NAME.next``, decides that they count; if the program
+dies after it and before all have their places, `sweep` brings them there.
 """
 
 from __future__ import annotations
@@ -11,7 +15,7 @@ import contextlib
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +39,7 @@ def write_atomic(path: Path, write: Callable[[Any], Any]) -> None:
     ReportsError
         The disk is full, or the folder cannot be written to.
     """
-    part = path.with_name(f".{path.name}.part")
+    part = _part(path.parent, path.name)
     with disk_errors(path):
         try:
             with open(part, "wb") as file:
@@ -53,6 +57,61 @@ def write_atomic(path: Path, write: Callable[[Any], Any]) -> None:
 def write_bytes(path: Path, content: bytes) -> None:
     """Write `content` as `write_atomic` does."""
     write_atomic(path, lambda file: file.write(content))
+
+
+def write_together(folder: Path, writes: Mapping[str, Callable[[Any], Any]]) -> None:
+    """Let several binary files of a folder take their places, all of them or none.
+
+    Parameters
+    ----------
+    folder : Path
+    writes : mapping of str to callable
+        What fills each file, by its name. The last one decides: whoever reads the folder after
+        `sweep` finds the others as they were when it was written.
+
+    Raises
+    ------
+    ReportsError
+        The disk is full, or the folder cannot be written to.
+    """
+    *others, last = writes
+    with disk_errors(folder / last):
+        _land(folder, others, last)  # what an earlier call could not bring to its place
+        try:
+            for name, write in writes.items():
+                with open(_part(folder, name), "wb") as file:
+                    write(file)
+                    file.flush()
+                    os.fsync(file.fileno())
+            sync_folder(folder)
+            os.replace(_part(folder, last), _next(folder, last))
+        except BaseException:
+            for name in writes:
+                with contextlib.suppress(OSError):
+                    os.unlink(_part(folder, name))
+            raise
+        sync_folder(folder)
+        _land(folder, others, last)
+
+
+def _land(folder: Path, others: Iterable[str], last: str) -> None:
+    """Bring files to their places that are decided upon; without ``.LAST.next`` there are none."""
+    if not _next(folder, last).exists():
+        return
+    for name in others:
+        if _part(folder, name).exists():
+            os.replace(_part(folder, name), folder / name)
+    sync_folder(folder)
+    os.replace(_next(folder, last), folder / last)
+    sync_folder(folder)
+
+
+def _part(folder: Path, name: str) -> Path:
+    return folder / f".{name}.part"
+
+
+def _next(folder: Path, name: str) -> Path:
+    return folder / f".{name}.next"
 
 
 def sync_folder(folder: Path) -> None:
@@ -89,12 +148,21 @@ def release(handle: int | None) -> None:
         os.close(handle)
 
 
-def sweep(folder: Path) -> None:
-    """Take away what killed writers left in a folder, unless somebody holds it."""
+def sweep(folder: Path, together: Sequence[str]) -> None:
+    """Bring to its place, or take away, what killed writers left, unless somebody holds the folder.
+
+    Parameters
+    ----------
+    folder : Path
+    together : sequence of str
+        Names of the files that `write_together` writes, the last one last.
+    """
     handle = hold(folder)
     if handle is None:
         return
     try:
+        with contextlib.suppress(OSError):  # a folder that can only be read
+            _land(folder, together[:-1], together[-1])
         for part in [*folder.glob(".*.part"), *folder.glob("*/.*.part")]:
             with contextlib.suppress(OSError):
                 part.unlink()

@@ -11,9 +11,9 @@
       pictures/*.npz    the pixels of the figures
       tables.md, figures/*.png and *.svg   rendered from the files above, at any time
 
-Everything is rewritten after every cell, ``run.json`` last: a cell counts once it is listed there,
-and rows of a cell that is not are left out when the run is read. So an interruption at any moment
-leaves the last whole state.
+Everything is rewritten after every cell, all files together: they change places once all of them
+are on the disk. A cell counts once it is listed in ``run.json``, and rows of a cell that is not are
+left out when the run is read. So an interruption at any moment leaves the last whole state.
 """
 
 from __future__ import annotations
@@ -32,12 +32,15 @@ import pandas as pd
 
 from hybrid_rt.errors import ArgumentError, UnknownNameError
 from hybrid_rt_bench.results import files
-from hybrid_rt_bench.results.files import ReportsError, write_atomic, write_bytes
+from hybrid_rt_bench.results.files import ReportsError, write_atomic
 from hybrid_rt_bench.results.schema import Schema, SchemaError
 
 SCHEMA_VERSION = 1
 
 TABLES = ("samples", "results", "verdicts")
+
+FILES = (*(f"{table}.parquet" for table in TABLES), "results.csv", "run.json")
+"""What is written together; ``run.json`` decides."""
 
 META: dict[str, type] = {
     "id": str, "started": str, "finished": bool, "interrupted": bool, "spec": dict, "notes": list,
@@ -194,15 +197,17 @@ class RunWriter:
         return [cell for cell in self.meta["cells"] if cell["state"] == "failed"]
 
     def flush(self) -> None:
-        """Write all files of the run, the one that lists its cells last."""
+        """Write all files of the run together, the one that lists its cells last."""
+        writes: dict[str, Callable[[Any], Any]] = {}
         for table, rows in self._rows.items():
             if rows:
                 frame = pd.DataFrame(rows)
-                write_atomic(self.folder / f"{table}.parquet", frame.to_parquet)
+                writes[f"{table}.parquet"] = frame.to_parquet
                 if table == "results":
-                    write_bytes(self.folder / "results.csv", frame.to_csv(index=False).encode())
+                    writes["results.csv"] = _writer(frame.to_csv(index=False))
         text = json.dumps(self.meta, indent=1, allow_nan=False, default=_plain)
-        write_bytes(self.folder / "run.json", text.encode())
+        writes[FILES[-1]] = _writer(text)
+        files.write_together(self.folder, writes)
 
     def _renewed(self, kept: Rows, keys: dict[str, Any], new: Rows) -> Rows:
         mine = [all(row.get(key) == keys[key] for key in keys) for row in kept]
@@ -253,7 +258,7 @@ def load_run(
         A folder without a finished cell, damaged, or of another schema version.
     """
     folder = _folder(run, out)
-    files.sweep(folder)
+    files.sweep(folder, FILES)
     try:
         meta = json.loads((folder / "run.json").read_text(encoding="utf-8"))
         _check_version(folder, meta)
@@ -353,6 +358,11 @@ def _unique(out: Path, name: str) -> Path:
             folder.mkdir()
             return folder
     raise ReportsError(f"{out}: a thousand runs named {name}")
+
+
+def _writer(text: str) -> Callable[[Any], Any]:
+    content = text.encode()
+    return lambda file: file.write(content)
 
 
 def _plain(value: Any) -> Any:

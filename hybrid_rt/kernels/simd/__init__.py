@@ -49,6 +49,7 @@ from .lanewise import (
     floor,
     maximum,
     minimum,
+    root,
     select,
     to_f32,
     to_f64,
@@ -58,6 +59,7 @@ from .lanewise import (
 from .make import f32, f64, first, i32, i64, iota, mask, mask_of_bits
 from .memory import gather, load, load_masked, scatter, store, store_masked
 from .packing import compress, expand
+from .records import pull, push, rows_of, select_each
 from .together import interleave, part
 from .triples import load_triples, store_triples
 
@@ -95,10 +97,15 @@ __all__ = [
     "maximum",
     "minimum",
     "part",
+    "pull",
+    "push",
     "reduce_add",
     "reduce_min",
+    "root",
+    "rows_of",
     "scatter",
     "select",
+    "select_each",
     "store",
     "store_masked",
     "store_triples",

@@ -74,6 +74,7 @@ absolute = _math(
 floor = _math(
     "floor", {"float": "floor"}, ("f32", "f64"), "Return the greatest whole number not above."
 )
+root = _math("root", {"float": "sqrt"}, ("f32", "f64"), "Return the square root, rounded.")
 
 
 def _convert(builder, value, old, new):

@@ -1,4 +1,4 @@
-"""The march of "Ray Tracing Algorithm Based on Screen Space Ray Marching", one ray at a time."""
+"""The march of "Ray Tracing Algorithm Based on Screen Space Ray Marching"."""
 
 from __future__ import annotations
 
@@ -6,131 +6,112 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid_rt.kernels._jit import called
-from hybrid_rt.kernels.techniques.driver import marches
-from hybrid_rt.kernels.techniques.screen import (
-    EXHAUSTED,
+from hybrid_rt.kernels import simd
+from hybrid_rt.kernels._jit import inlined
+from hybrid_rt.kernels.techniques.cells import (
     F0,
     HALF,
-    HIDDEN,
-    HIT,
-    OFFSCREEN,
-    axis,
-    clamp,
-    edge_s,
-    next_cell,
+    NONE,
+    cells_of,
+    exits_of,
+    onwards,
+    reading,
+    walk_of,
 )
+from hybrid_rt.kernels.techniques.driver import Answers, begins, finishes, steps
+from hybrid_rt.kernels.techniques.screen import HIDDEN, HIT
 
-
-@called
-def tilted_plane_s(i, j, buffers, line, axes, s_start, s_end):
-    """Return the s at which the ray meets the plane of pixel (i, j) inside that pixel, or -1.
-
-    The pixel is the plane ``depth + ddx (x - i - 1/2) + ddy (y - j - 1/2)``; the ray must reach it
-    from the observer's side. `line`: its start and deltas on the screen; `axes`: see `screen.axis`.
-    Paper: "Correct".
-    """
-    depth, ddx, ddy, _ = buffers
-    x0, y0, z0, dx, dy, dz = line
-    inv_x, inv_y, step_x, step_y = axes
-    centre = depth[j, i]
-    if centre <= F0:
-        return np.float32(-1.0)
-    first, last = s_start, s_end
-    if step_x != 0:
-        first = max(first, (np.float32(i + (step_x < 0)) - x0) * inv_x)
-        last = min(last, (np.float32(i + (step_x > 0)) - x0) * inv_x)
-    if step_y != 0:
-        first = max(first, (np.float32(j + (step_y < 0)) - y0) * inv_y)
-        last = min(last, (np.float32(j + (step_y > 0)) - y0) * inv_y)
-    a, b = ddx[j, i], ddy[j, i]
-    # Height of the ray in front of the plane, linear in s: h(s) = h0 + s * hs.
-    h0 = z0 - (centre + a * (x0 - np.float32(i) - HALF) + b * (y0 - np.float32(j) - HALF))
-    hs = dz - (a * dx + b * dy)
-    in_front = h0 + first * hs
-    behind = h0 + last * hs
-    if in_front < F0 or behind > F0 or last < first:
-        return np.float32(-1.0)
-    if in_front == behind:
-        return first
-    return first + (last - first) * (in_front / (in_front - behind))
+BLOCKED = -1
+"""Status of a ray that a pixel blocks: that pixel's plane will tell."""
 
 
 class PaperNumbers(NamedTuple):
-    """Parameters of `hybrid_rt.Paper`."""
+    """Parameters of `hybrid_rt.Paper`; the pyramid's `raster.pyramid.bits` and its last level."""
 
     samples: int
     max_steps: int
+    bits: tuple[int, int]
+    top: int
 
 
-@marches(PaperNumbers)
-def paper_ray(numbers, buffers, pyramid, ray, own_x, own_y, steps_by_level):
-    """March one ray, as `driver.march_ray`."""
-    cells, offsets, pitches = pyramid
-    x, y, z0 = np.float32(ray.x), np.float32(ray.y), np.float32(ray.depth)
-    dx, dy, dz = np.float32(ray.dx), np.float32(ray.dy), np.float32(ray.dz)
-    s_end = np.float32(ray.s_end)
+@begins(PaperNumbers)
+def paper_begin(numbers, buffers, pyramid, rays, kept):
+    """Begin rays, as `driver.begin`."""
     height, width = buffers.depth.shape
-    top = offsets.shape[0] - 1
-    inv_x, bias_x, step_x, far_x = axis(dx)
-    inv_y, bias_y, step_y, far_y = axis(dy)
-    cx = clamp(int(x), 0, width - 1)
-    cy = clamp(int(y), 0, height - 1)
-    s = F0
-    level = 0
-    steps = 0
-    from_x = False  # the ray entered the current pixel through a vertical edge
-    # A ray on the visible surface of its own pixel leaves that pixel unread: the surface would
-    # only be compared with itself.
-    skip = cx == own_x and cy == own_y
-    while True:
-        blocked = False
-        for _ in range(numbers.samples):
-            lx, ly = cx >> level, cy >> level
-            edge_x, edge_y = (lx + far_x) << level, (ly + far_y) << level
-            sx = edge_s(edge_x, x, inv_x, bias_x)
-            sy = edge_s(edge_y, y, inv_y, bias_y)
-            s_exit = min(min(sx, sy), s_end)
-            if skip:
-                skip = False
-            else:
-                if steps == numbers.max_steps:
-                    return EXHAUSTED, False, -1, -1, F0, s, steps
-                steps += 1
-                steps_by_level[level] += 1
-                nearest = cells[offsets[level] + ly * pitches[level] + lx]
-                farthest_ray = z0 + dz * (s_exit if dz < F0 else s)
-                if nearest > F0 and not farthest_ray > nearest:
-                    blocked = True
-                    break
-            if s_exit > s:
-                s = s_exit
-            if s_exit >= s_end:
-                return ray.status, False, -1, -1, F0, s_end, steps
-            from_x = sx < sy
-            cx, cy = next_cell(
-                cx, cy, lx, ly, level, edge_x, edge_y, sx, sy, s, x, y, dx, dy, step_x, step_y
-            )
-            if cx < 0 or cy < 0 or cx >= width or cy >= height:
-                return OFFSCREEN, False, -1, -1, F0, s, steps
-        if not blocked:
-            if level < top:
-                level += 1
-        elif level > 0:
-            level -= 1
-        else:
-            break
-    hit_x, hit_y = cx, cy
-    line = x, y, z0, dx, dy, dz
-    axes = inv_x, inv_y, step_x, step_y
-    hit = tilted_plane_s(hit_x, hit_y, buffers, line, axes, F0, s_end)
-    if hit < F0 and s > F0:
-        if from_x:
-            hit_x -= step_x
-        else:
-            hit_y -= step_y
-        if not (hit_x == own_x and hit_y == own_y):
-            hit = tilted_plane_s(hit_x, hit_y, buffers, line, axes, F0, s_end)
-    if hit < F0:
-        return HIDDEN, False, -1, -1, F0, s, steps
-    return HIT, True, hit_x, hit_y, hit, min(s, hit), steps
+    return walk_of(rays, kept, width, height)
+
+
+@steps(PaperNumbers)
+def paper_step(numbers, buffers, pyramid, kept, state, active, counts):
+    """Take a step, as `driver.step`."""
+    height, width = buffers.depth.shape
+    line = state.line
+    cell = exits_of(line, state.cx, state.cy, state.level)
+    reads, tired, taken = reading(state, active, numbers.max_steps, counts)
+    at = cells_of(state.level, cell.x, cell.y, numbers.bits)
+    nearest = simd.gather(pyramid.cells, at, reads, F0)
+    farthest_ray = line.z + line.dz * simd.select(line.dz < F0, cell.s, state.s)
+    blocked = reads & (nearest > F0) & ~(farthest_ray > nearest)
+    return onwards(
+        state, cell, active, blocked, tired, taken, numbers.samples, numbers.top, width, height,
+        BLOCKED,
+    )  # fmt: skip
+
+
+@inlined
+def tilted_plane_s(i, j, asked, buffers, line):
+    """Return the s at which rays meet the planes of pixels (i, j) inside these, or -1.
+
+    The pixel is the plane ``depth + ddx (x - i - 1/2) + ddy (y - j - 1/2)``; the ray must reach it
+    from the observer's side. Paper: "Correct".
+    """
+    none = np.float32(-1.0)
+    at = j * np.int32(buffers.depth.shape[1]) + i
+    centre = simd.gather(buffers.depth, at, asked, F0)
+    a = simd.gather(buffers.ddx, at, asked, F0)
+    b = simd.gather(buffers.ddy, at, asked, F0)
+    right, left = line.inv_x > F0, line.inv_x < F0
+    down, up = line.inv_y > F0, line.inv_y < F0
+    enters = (simd.to_f32(i + simd.to_i32(left)) - line.x) * line.inv_x
+    leaves = (simd.to_f32(i + simd.to_i32(right)) - line.x) * line.inv_x
+    first = simd.select(right | left, simd.maximum(enters, F0), F0)
+    last = simd.select(right | left, simd.minimum(leaves, line.s_end), line.s_end)
+    enters = (simd.to_f32(j + simd.to_i32(up)) - line.y) * line.inv_y
+    leaves = (simd.to_f32(j + simd.to_i32(down)) - line.y) * line.inv_y
+    first = simd.select(down | up, simd.maximum(enters, first), first)
+    last = simd.select(down | up, simd.minimum(leaves, last), last)
+    # Height of the ray in front of the plane, linear in s: h(s) = h0 + s * hs.
+    out_x, out_y = line.x - simd.to_f32(i) - HALF, line.y - simd.to_f32(j) - HALF
+    h0 = line.z - (centre + a * out_x + b * out_y)
+    hs = line.dz - (a * line.dx + b * line.dy)
+    in_front = h0 + first * hs
+    behind = h0 + last * hs
+    met = first + (last - first) * (in_front / (in_front - behind))
+    met = simd.select(in_front == behind, first, met)
+    off = (in_front < F0) | (behind > F0) | (last < first)
+    return simd.select(asked & (centre > F0) & ~off, met, none)
+
+
+@finishes(PaperNumbers)
+def paper_finish(numbers, buffers, pyramid, kept, state, done):
+    """Finish rays, as `driver.finish`."""
+    line = state.line
+    blocked = done & (state.status == BLOCKED)
+    x, y = state.cx, state.cy
+    hit = tilted_plane_s(x, y, blocked, buffers, line)
+    # Then the pixel that the ray has come from.
+    second = blocked & (hit < F0) & (state.s > F0)
+    back_x = simd.to_i32(line.inv_x < F0) - simd.to_i32(line.inv_x > F0)
+    back_y = simd.to_i32(line.inv_y < F0) - simd.to_i32(line.inv_y > F0)
+    before_x = simd.select(state.sideways, x + back_x, x)
+    before_y = simd.select(state.sideways, y, y + back_y)
+    second = second & ~((before_x == kept.own_x) & (before_y == kept.own_y))
+    hit = simd.select(second, tilted_plane_s(before_x, before_y, second, buffers, line), hit)
+    x, y = simd.select(second, before_x, x), simd.select(second, before_y, y)
+    answers = blocked & ~(hit < F0)
+    status = simd.select(blocked, HIDDEN, state.status)
+    return Answers(
+        simd.select(answers, HIT, status), answers, simd.select(answers, x, NONE),
+        simd.select(answers, y, NONE), simd.to_f64(hit),
+        simd.to_f64(simd.select(answers, simd.minimum(hit, state.s), state.s)), state.steps,
+    )  # fmt: skip

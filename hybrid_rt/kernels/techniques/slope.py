@@ -1,4 +1,4 @@
-"""The paper's march over planes that bound tilted pixels, one ray at a time."""
+"""The paper's march over planes that bound tilted pixels."""
 
 from __future__ import annotations
 
@@ -6,104 +6,103 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._jit import inlined
-from hybrid_rt.kernels.techniques.driver import marches
-from hybrid_rt.kernels.techniques.screen import (
-    EXHAUSTED,
+from hybrid_rt.kernels.techniques.cells import (
     F0,
-    HIDDEN,
-    HIT,
-    OFFSCREEN,
-    axis,
-    clamp,
-    edge_s,
-    next_cell,
+    HALF,
+    NONE,
+    cells_of,
+    exits_of,
+    onwards,
+    reading,
+    walk_of,
 )
+from hybrid_rt.kernels.techniques.driver import Answers, begins, finishes, steps
+from hybrid_rt.kernels.techniques.placing import LANES
+from hybrid_rt.kernels.techniques.screen import HIDDEN, HIT
 
 # A ray that enters a pixel on its plane may come out behind it by rounding: of the depth and of the
 # plane's value, some half-ulps each, and of the place on the screen, a half-ulp of the coordinate
 # times the slope for the ray's product, its sum and the plane's centre.
 ROUNDING = np.float32(2.0**-22)
 
-
-@inlined
-def height_above(data, cell, level, lx, ly, x, y, z):
-    """Return how far a ray's point is in front of the plane of a cell, and the rounding of that."""
-    half = np.float32(0.5) * np.float32(1 << level)
-    slope_x, slope_y = data[cell, 1], data[cell, 2]
-    out_x = slope_x * (x - (np.float32(lx << level) + half))
-    out_y = slope_y * (y - (np.float32(ly << level) + half))
-    slack = ROUNDING * (abs(z) + abs(slope_x) * x + abs(slope_y) * y)
-    return z - (data[cell, 0] + out_x + out_y), slack
+BLOCKED = -1
+"""Status of a ray that a pixel's plane blocks."""
 
 
 class SlopeNumbers(NamedTuple):
-    """Parameters of `hybrid_rt.SlopeAware`."""
+    """Parameters of `hybrid_rt.SlopeAware`; the pyramid's `raster.pyramid.bits`, its last level."""
 
     samples: int
     max_steps: int
+    bits: tuple[int, int]
+    top: int
 
 
-@marches(SlopeNumbers)
-def slope_ray(numbers, buffers, pyramid, ray, own_x, own_y, steps_by_level):
-    """March one ray through planes (C, 3), as `driver.march_ray`."""
-    data, offsets, pitches = pyramid
-    height, width = buffers.prim_id.shape
-    x, y, z0 = np.float32(ray.x), np.float32(ray.y), np.float32(ray.depth)
-    dx, dy, dz = np.float32(ray.dx), np.float32(ray.dy), np.float32(ray.dz)
-    s_end = np.float32(ray.s_end)
-    top = offsets.shape[0] - 1
-    inv_x, bias_x, step_x, far_x = axis(dx)
-    inv_y, bias_y, step_y, far_y = axis(dy)
-    cx = clamp(int(x), 0, width - 1)
-    cy = clamp(int(y), 0, height - 1)
-    s = F0
-    level = 0
-    steps = 0
-    # A ray on the visible surface of its own pixel leaves that pixel unread: the surface would
-    # only be compared with itself.
-    skip = cx == own_x and cy == own_y
-    while True:
-        blocked = False
-        for _ in range(numbers.samples):
-            lx, ly = cx >> level, cy >> level
-            edge_x, edge_y = (lx + far_x) << level, (ly + far_y) << level
-            sx = edge_s(edge_x, x, inv_x, bias_x)
-            sy = edge_s(edge_y, y, inv_y, bias_y)
-            s_exit = max(s, min(min(sx, sy), s_end))
-            if skip:
-                skip = False
-            else:
-                if steps == numbers.max_steps:
-                    return EXHAUSTED, False, -1, -1, F0, s, steps
-                steps += 1
-                steps_by_level[level] += 1
-                cell = offsets[level] + ly * pitches[level] + lx
-                entry, slack = height_above(
-                    data, cell, level, lx, ly, x + dx * s, y + dy * s, z0 + dz * s
-                )
-                leave, _ = height_above(
-                    data, cell, level, lx, ly, x + dx * s_exit, y + dy * s_exit, z0 + dz * s_exit
-                )
-                if entry < -slack or leave <= F0:
-                    if level > 0:
-                        blocked = True
-                        break
-                    if entry < -slack:
-                        return HIDDEN, False, -1, -1, F0, s, steps
-                    entry = max(entry, F0)
-                    span = s_exit - s
-                    hit = s + span * (entry / (entry - leave)) if entry > leave else s
-                    return HIT, True, cx, cy, hit, hit, steps
-            s = s_exit
-            if s >= s_end:
-                return ray.status, False, -1, -1, F0, s_end, steps
-            cx, cy = next_cell(
-                cx, cy, lx, ly, level, edge_x, edge_y, sx, sy, s, x, y, dx, dy, step_x, step_y
-            )
-            if cx < 0 or cy < 0 or cx >= width or cy >= height:
-                return OFFSCREEN, False, -1, -1, F0, s, steps
-        if blocked:
-            level -= 1
-        elif level < top:
-            level += 1
+@begins(SlopeNumbers)
+def slope_begin(numbers, buffers, pyramid, rays, kept):
+    """Begin rays, as `driver.begin`."""
+    height, width = buffers.depth.shape
+    return walk_of(rays, kept, width, height)
+
+
+@inlined
+def plane_of(pyramid, numbers, walk, cell, m):
+    """Return the planes of cells: depth at the centre, slopes, and the centre."""
+    at = cells_of(walk.level, cell.x, cell.y, numbers.bits) * np.int32(3)
+    half = HALF * simd.to_f32(simd.i32(1, LANES) << walk.level)
+    return (
+        simd.gather(pyramid.cells, at, m, F0),
+        simd.gather(pyramid.cells, at + np.int32(1), m, F0),
+        simd.gather(pyramid.cells, at + np.int32(2), m, F0),
+        simd.to_f32(cell.x << walk.level) + half,
+        simd.to_f32(cell.y << walk.level) + half,
+    )
+
+
+@inlined
+def height_above(plane, line, s):
+    """Return how far the points of rays at s are in front of planes, and the rounding of that."""
+    centre, slope_x, slope_y, centre_x, centre_y = plane
+    x, y, z = line.x + line.dx * s, line.y + line.dy * s, line.z + line.dz * s
+    out_x, out_y = slope_x * (x - centre_x), slope_y * (y - centre_y)
+    size = simd.absolute(z) + simd.absolute(slope_x) * x + simd.absolute(slope_y) * y
+    return z - (centre + out_x + out_y), ROUNDING * size
+
+
+@steps(SlopeNumbers)
+def slope_step(numbers, buffers, pyramid, kept, state, active, counts):
+    """Take a step, as `driver.step`."""
+    height, width = buffers.depth.shape
+    cell = exits_of(state.line, state.cx, state.cy, state.level)
+    s_exit = simd.maximum(cell.s, state.s)
+    reads, tired, taken = reading(state, active, numbers.max_steps, counts)
+    plane = plane_of(pyramid, numbers, state, cell, reads)
+    entry, slack = height_above(plane, state.line, state.s)
+    leave, _ = height_above(plane, state.line, s_exit)
+    blocked = reads & ((entry < -slack) | (leave <= F0))
+    return onwards(
+        state, cell, active, blocked, tired, taken, numbers.samples, numbers.top, width, height,
+        BLOCKED,
+    )  # fmt: skip
+
+
+@finishes(SlopeNumbers)
+def slope_finish(numbers, buffers, pyramid, kept, state, done):
+    """Finish rays, as `driver.finish`."""
+    blocked = done & (state.status == BLOCKED)
+    cell = exits_of(state.line, state.cx, state.cy, state.level)
+    s_exit = simd.maximum(cell.s, state.s)
+    plane = plane_of(pyramid, numbers, state, cell, blocked)
+    entry, slack = height_above(plane, state.line, state.s)
+    leave, _ = height_above(plane, state.line, s_exit)
+    answers = blocked & ~(entry < -slack)
+    entry = simd.maximum(entry, F0)
+    s = state.s + (s_exit - state.s) * (entry / (entry - leave))
+    s = simd.select(answers & (entry > leave), s, state.s)
+    status = simd.select(blocked, HIDDEN, state.status)
+    return Answers(
+        simd.select(answers, HIT, status), answers, simd.select(answers, state.cx, NONE),
+        simd.select(answers, state.cy, NONE), simd.to_f64(s), simd.to_f64(s), state.steps,
+    )  # fmt: skip

@@ -178,7 +178,7 @@ def _load(
     """Fill a packet from place `first` of the queue on; return whether any of its lanes is valid.
 
     No row like ``origin[i]`` is formed, here or in any loop over rays: Numba counts references to
-    it, in atomic steps that took twice as long as all the rest.
+    it, in atomic steps that take longer than everything else here.
     """
     if width == WIDTH and in_order:
         done, some = _load_vectors(

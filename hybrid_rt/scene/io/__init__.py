@@ -20,9 +20,9 @@ from hybrid_rt.scene.io.gltf import cameras, reader
 from hybrid_rt.scene.io.gltf.cameras import FileCamera
 from hybrid_rt.scene.mesh import Mesh, Scene
 
-__all__ = ["SUFFIXES", "FileCamera", "load_scene", "read_cameras", "read_mesh"]
+__all__ = ["GLTF_SUFFIXES", "SUFFIXES", "FileCamera", "load_scene", "read_cameras", "read_mesh"]
 
-_GLTF = (".glb", ".gltf")
+GLTF_SUFFIXES = (".glb", ".gltf")
 _ONE_FILE = {".obj": obj.read, ".ply": ply.read, ".stl": stl.read}
 SUFFIXES = (".npz", ".obj", ".ply", ".glb", ".gltf", ".stl")
 
@@ -91,13 +91,13 @@ def _read(path: Path, budget: Budget) -> tuple[Mesh, str]:
     if suffix == ".npz":
         return Mesh.from_arrays(**npz.read(path, budget)), ""
     data = _bytes(path, budget)
-    found = reader.read(path, data, budget) if suffix in _GLTF else _ONE_FILE[suffix](data)
+    found = reader.read(path, data, budget) if suffix in GLTF_SUFFIXES else _ONE_FILE[suffix](data)
     arrays = found.vertices, found.faces, found.object_id, found.polygon_id
     return Mesh.from_arrays(*arrays), found.skipped
 
 
 def read_cameras(path: str | Path, *, max_bytes: int | None = None) -> list[FileCamera]:
-    """Return the perspective cameras in the default scene of a glTF file.
+    """Return the cameras in the default scene of a glTF file.
 
     Parameters
     ----------
@@ -109,15 +109,14 @@ def read_cameras(path: str | Path, *, max_bytes: int | None = None) -> list[File
     Returns
     -------
     list of FileCamera
-        In the order of the scene's nodes; empty where there is none. Orthographic ones are left
-        out.
+        In the order of the scene's nodes; empty where there is none.
 
     Raises
     ------
     ArgumentError, MeshFileError
         As in `read_mesh`.
     """
-    path = _regular_file(path, _GLTF, "glTF")
+    path = _regular_file(path, GLTF_SUFFIXES, "glTF")
     try:
         return cameras.read(path, _bytes(path, Budget(max_bytes)))
     except Exception as error:

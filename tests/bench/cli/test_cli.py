@@ -190,7 +190,8 @@ def test_list_and_info_tell_what_is_there():
         "shadow_area",
     ):
         assert word in listed.stdout
-    for word in ("embree", "numba", "cpu"):
+    assert "with a stage: the sphere alone is the paper's" in " ".join(listed.stdout.split())
+    for word in ("embree", "numba", "cpu", "scenes"):
         assert word in told.stdout
 
 

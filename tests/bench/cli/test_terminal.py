@@ -1,5 +1,6 @@
 """Streams that end, encodings that lack signs, signals: the program goes on, or ends in order."""
 
+import io
 import json
 import os
 import signal
@@ -97,6 +98,30 @@ def test_ascii_is_enough_and_brackets_are_brackets(tmp_path):
     )
     assert "Traceback" not in refused.stderr
     assert refused.stderr.count("[/red]") >= 3
+
+
+@pytest.mark.parametrize(
+    ("columns", "width"),
+    [("60", 60), ("300", 300), (" 80 ", 80), ("", 160), ("0", 160), ("-5", 160), ("wide", 160),
+     ("9" * 40, 160), ("²³", 160), (None, 160)],
+)  # fmt: skip
+def test_the_width_that_is_asked_for_is_kept_where_there_is_no_terminal(
+    monkeypatch, columns, width
+):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    if columns is not None:
+        monkeypatch.setenv("COLUMNS", columns)
+    monkeypatch.setattr(sys, "stdout", io.StringIO())
+    assert terminal.out().width == width
+
+
+@POSIX
+@pytest.mark.parametrize("columns", [70, 110])
+def test_a_list_that_goes_into_a_file_is_as_wide_as_columns_says(columns):
+    done = shell("$RT list", COLUMNS=str(columns))
+    boxes = [line for line in done.stdout.splitlines() if line.startswith(("┏", "│", "└"))]
+    assert boxes
+    assert max(map(len, boxes)) <= columns
 
 
 def test_signs_that_an_encoding_lacks_have_plain_ones(tmp_path):

@@ -287,7 +287,7 @@ def test_an_option_of_another_kind_is_refused(monkeypatch, tmp_path, capsys):
 
 
 def write_run(out, record):
-    """Write a run of two numbers of threads: with one the march may take 100 ns, with two none."""
+    """Write a run of two numbers of threads: with one it breaks even at 100 ns, with two never."""
     writer = results.create_run(
         out,
         "roofline",
@@ -313,25 +313,25 @@ def write_run(out, record):
 def test_the_report_is_made_of_the_files_alone(tmp_path, record):
     data = write_run(tmp_path, record)
     by_title = {table.title: table for table in report.tables(data)}
-    table = by_title["What the march may take, and what it takes"]
+    table = by_title["The break-even march time, and what the march takes, ns per ray"]
     assert [row[0] for row in table.rows] == [
         "1 thread", "hall, front", "2 threads", "hall, front"
     ]  # fmt: skip
     first = cells_of(table, "hall, front")
-    assert (first["march / may take"], first["set-up / may take"]) == ("3.00", "0.400")
+    assert (first["march / break-even"], first["set-up / break-even"]) == ("3.00", "0.400")
     assert table.rows[3][7:11] == ["none"] * 4
     row = data.results.iloc[0]
     at_once = cells_of(by_title["The march's time"], "hall, front")
-    assert at_once["ns a step"] == report.number(300 * row.rays / row.steps)
-    assert cells_of(by_title["The march's work, a ray"], "hall, front")["rays"] == f"{row.rays:,}"
+    assert at_once["march, ns per step"] == report.number(300 * row.rays / row.steps)
+    assert cells_of(by_title["The march's work per ray"], "hall, front")["rays"] == f"{row.rays:,}"
     busy = cells_of(by_title[f"Lanes at work, % of {WIDTH}"], "hall, front")
     assert busy["step"] == report.number(100 * row.busy_step)
-    drawn = cells_of(by_title["The raster's time"], "hall, front")
+    drawn = cells_of(by_title["The raster's time, ms per view"], "hall, front")
     assert drawn["tiles"] == report.number(row.tiles_ms)
     assert len(by_title["Gathers"].rows) == 1 + len(roofline.STRUCTURES)
     fast = cells_of(by_title["How fast the machine reads"], "16")
-    assert fast["gathers, G numbers/s, 1 thread"] == "0.125"
-    assert fast["gathers, G numbers/s, 2 threads"] == "0.250"
+    assert fast["gathers, G elements/s, 1 thread"] == "0.125"
+    assert fast["gathers, G elements/s, 2 threads"] == "0.250"
     _, written = render_run(data)
     assert [path.name for path in written] == [
         "tables.md", "gather-rate.png", "gather-rate.svg", "march-budget.png", "march-budget.svg"

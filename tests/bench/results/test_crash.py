@@ -144,6 +144,78 @@ def whole_run(folder):
     return None
 
 
+ROUNDS = (2, 3, 4)
+"""Of one cell, which is kept again with each round more."""
+
+
+def write_growing(out):
+    with paper_run(out) as writer:
+        for rounds in ROUNDS:
+            cell, *rows = paper_cell("left", rounds)
+            writer.add_cell({**cell, "kept_rounds": rounds}, *rows)
+            yield rounds
+        writer.finish()
+
+
+@pytest.mark.slow
+def test_a_cell_that_grows_has_as_many_rounds_in_every_file(tmp_path, monkeypatch):
+    """Whenever the program dies, samples, results and run.json are of one round."""
+    when, seen = 0, set()
+    while True:
+        out, landed = tmp_path / str(when), 0
+        with monkeypatch.context() as patch:
+            death = Death(patch, when)
+            try:
+                for rounds in write_growing(out):
+                    landed = rounds
+            except Killed:
+                pass
+        if not death.dead:
+            break
+        when += 1
+        folders = list(out.glob("*")) if out.exists() else []
+        there = bool(folders) and (folders[0] / "run.json").exists()
+        run = whole_run(folders[0]) if there else None
+        if run is None:
+            assert not landed
+            continue
+        (cell,) = run.meta["cells"]
+        kept = cell["kept_rounds"]
+        assert kept in (landed, *(r for r in ROUNDS if r == landed + 1 or not landed))
+        assert set(run.results.rounds) == {kept}
+        assert run.samples["round"].nunique() == kept
+        assert not list(run.folder.rglob(".*"))
+        seen.add(kept)
+    assert seen == set(ROUNDS)
+    assert 60 < when < 250, "a write was not seen, or seen twice"
+
+
+def test_a_failure_between_two_places_is_made_good_by_the_next_write(tmp_path, monkeypatch):
+    """The disk refuses to rename for a while, after it was decided that the new files count."""
+    replace, left = os.replace, [2]
+
+    def refusing(*arguments):
+        left[0] -= 1
+        if left[0] < 0:
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        return replace(*arguments)
+
+    def written(number):
+        return {n: lambda f: f.write(b"%d" % number) for n in ("a", "b", "last")}
+
+    files.write_together(tmp_path, written(1))
+    monkeypatch.setattr(os, "replace", refusing)
+    with pytest.raises(ReportsError):
+        files.write_together(tmp_path, written(2))
+    monkeypatch.undo()
+    assert [(tmp_path / n).read_bytes() for n in ("a", "b", "last")] == [b"2", b"1", b"1"]
+    files.sweep(tmp_path, ("a", "b", "last"))
+    assert [(tmp_path / n).read_bytes() for n in ("a", "b", "last")] == [b"2"] * 3
+    files.write_together(tmp_path, written(3))
+    assert [(tmp_path / n).read_bytes() for n in ("a", "b", "last")] == [b"3"] * 3
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a", "b", "last"]
+
+
 def test_rows_of_a_cell_that_is_not_listed_are_left_out(tmp_path):
     folder = write_all(tmp_path / "a")
     writer = paper_run(tmp_path / "b")

@@ -97,16 +97,16 @@ def test_ratios_are_of_any_two_stages():
     assert x.ratio(samples(), "hybrid", "embree").value == pytest.approx(1 / np.sqrt(4 * 1))
 
 
-def test_the_march_may_cost_what_the_rest_of_the_hybrid_leaves_of_embrees_time():
+def test_the_break_even_march_time_is_what_the_other_stages_leave_of_embrees():
     pooled = pools(frame(), ["technique"])
     # Camera a: median of 2, 4, 6 less a quarter of 1; camera b: of 1, 2, 9 less a quarter of each.
     spare = (4 - 0.25) + (2 - 0.5)
-    assert pooled[("x",)].may_cost(samples()) == pytest.approx(1e9 * spare / 400)
+    assert pooled[("x",)].break_even_ns(samples()) == pytest.approx(1e9 * spare / 400)
     only_a = samples()[lambda s: s["camera"] == "a"]  # what is not timed has no part in it
-    assert pooled[("x",)].may_cost(only_a) == pytest.approx(1e9 * 3.75 / 100)
-    assert np.isnan(pooled[("x",)].may_cost(pd.DataFrame()))
+    assert pooled[("x",)].break_even_ns(only_a) == pytest.approx(1e9 * 3.75 / 100)
+    assert np.isnan(pooled[("x",)].break_even_ns(pd.DataFrame()))
     slow = samples().assign(hybrid=100.0, march=1.0)
-    assert pooled[("x",)].may_cost(slow) < 0
+    assert pooled[("x",)].break_even_ns(slow) < 0
 
 
 def test_nanoseconds_a_ray_are_of_the_timed_rows():

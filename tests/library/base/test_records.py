@@ -97,7 +97,7 @@ def test_arrays_of_any_layout_and_byte_order_are_read_right(order, layout):
         ({"prim_id": np.full((3, 4), 1)}, r"^prim_id: expected values from -1 to 0"),
         ({"prim_id": np.full((3, 4), 0)}, r"^prim_id: expected -1 where depth is 0"),
         ({"camera": None}, "^camera: expected a Camera"),
-        ({"scene": None}, "^scene: expected a Scene"),
+        ({"scene": "hall"}, "^scene: expected a Scene"),
     ],
 )
 def test_a_gbuffer_that_contradicts_itself_is_refused(changes, said):

@@ -10,6 +10,7 @@ import platform
 import re
 import subprocess
 import sys
+from typing import NamedTuple
 
 import llvmlite.binding
 import numpy as np
@@ -49,10 +50,15 @@ from hybrid_rt.kernels.simd import (  # fmt: skip
     maximum,
     minimum,
     part,
+    pull,
+    push,
     reduce_add,
     reduce_min,
+    root,
+    rows_of,
     scatter,
     select,
+    select_each,
     store,
     store_masked,
     store_triples,
@@ -142,17 +148,18 @@ def test_float_arithmetic(dtype):
             store(out[12], i, s / x)
             store(out[13], i, maximum(x, 0))
             store(out[14], i, x * y + s)  # stays two roundings
+            store(out[15], i, root(x))
 
     a, b = hard_floats(dtype)
     s = 0.1
-    out = np.empty((15, a.size), dtype)
+    out = np.empty((16, a.size), dtype)
     run(a, b, s, out)
     s = dtype(s)
     with np.errstate(all="ignore"):
         wanted = [
             a + b, a - b, a * b, a / b, -a, np.where(a < b, a, b), np.where(a > b, a, b),
             np.abs(a), np.floor(a), a + s, s - a, a * dtype(3), s / a,
-            np.where(a > 0, a, dtype(0)), a * b + s,
+            np.where(a > 0, a, dtype(0)), a * b + s, np.sqrt(a),
         ]  # fmt: skip
     for got, want in zip(out, wanted, strict=True):
         assert_same(got, want)
@@ -602,6 +609,88 @@ def test_packing(dtype, lanes):
         wanted[m] = a[: m.sum()]
         assert_same(spread, wanted)
         assert_same(spread_on, np.where(m, a, dtype(-1)))
+
+
+class Inner(NamedTuple):
+    number: object
+    chosen: object
+
+
+class Record(NamedTuple):
+    near: object
+    inner: Inner
+    wide: object
+
+
+@compiled
+def choose_records(m, a, b, out_f, out_i, out_m, out_d):
+    one = Record(load(a, 0), Inner(to_i32(load(a, 0)), load(a, 0) > 0.0), to_f64(load(a, 0)))
+    two = Record(load(b, 0), Inner(to_i32(load(b, 0)), load(b, 0) > 0.0), to_f64(load(b, 0)))
+    got = select_each(load(m, 0), one, two)
+    store(out_f, 0, got.near)
+    store(out_i, 0, got.inner.number)
+    store(out_m, 0, got.inner.chosen)
+    store(out_d, 0, got.wide)
+
+
+@compiled
+def queue_records(m, taken, a, b, memory, at, out_f, out_i, out_m, out_d):
+    one = Record(load(a, 0), Inner(to_i32(load(a, 0)), load(a, 0) > 0.0), to_f64(load(a, 0)))
+    two = Record(load(b, 0), Inner(to_i32(load(b, 0)), load(b, 0) > 0.0), to_f64(load(b, 0)))
+    push(memory, at, one, load(m, 0))
+    got = pull(memory, at, two, load(taken, 0))
+    store(out_f, 0, got.near)
+    store(out_i, 0, got.inner.number)
+    store(out_m, 0, got.inner.chosen)
+    store(out_d, 0, got.wide)
+    return rows_of(one)
+
+
+def outputs_of(values):
+    """Return what `choose_records` and `queue_records` write for a record made of these values."""
+    return values, values.astype(np.int32), values > 0, values.astype(np.float64)
+
+
+def test_records_are_chosen_lane_by_lane():
+    rng = np.random.default_rng(3)
+    for m in masks():
+        a, b = rng.normal(0, 9, (2, WIDTH)).astype(np.float32)
+        found = [np.zeros(WIDTH, each.dtype) for each in outputs_of(a)]
+        choose_records(m, a, b, *found)
+        for got, wanted in zip(found, outputs_of(np.where(m, a, b)), strict=True):
+            assert_same(got, wanted)
+
+
+def test_records_wait_in_memory():
+    rng = np.random.default_rng(4)
+    for m in masks():
+        a, b = rng.normal(0, 9, (2, WIDTH)).astype(np.float32)
+        taken = rng.permutation(m)
+        memory = np.full((4, 3 * WIDTH), -1, np.int64)
+        found = [np.zeros(WIDTH, each.dtype) for each in outputs_of(a)]
+        assert queue_records(m, taken, a, b, memory, 5, *found) == 4
+        wanted = b.copy()
+        wanted[taken] = a[m]
+        for got, expected in zip(found, outputs_of(wanted), strict=True):
+            assert_same(got, expected)
+        # Rows lie apart, and nothing is written before the entry or a vector behind it.
+        assert (memory[:, 5 + WIDTH :] == -1).all()
+        assert (memory[3, :5] == -1).all()
+        assert (memory[0].view(np.int32)[:5] == -1).all()
+
+
+def test_records_that_differ_are_refused():
+    @njit
+    def mixed(m):
+        return select_each(mask(m), (f32(1.0), i32(2)), (f32(1.0), f32(2.0)))
+
+    @njit
+    def scalars(m):
+        return select_each(mask(m), (f32(1.0), 2), (f32(1.0), 2))
+
+    for body in (mixed, scalars):
+        with pytest.raises(TypingError, match="select_each"):
+            body(True)
 
 
 @pytest.mark.parametrize("dtype", FLOATS + INTS)

@@ -26,7 +26,7 @@ apart = from_python(kernels.apart)
 
 
 def planes_case(seed):
-    """Return (camera, lists, projected triangles, places); a place is (face, x, y) in float32.
+    """Return (rng, lists, projected triangles, places); a place is (face, x, y) in float32.
 
     Triangles of all sizes, slivers, some that cross the near plane, some seen nearly edge-on. The
     places lie in grown pixels that the triangle touches.
@@ -45,7 +45,7 @@ def planes_case(seed):
         corners[k, 2] = a + 0.5 * (b - a) + 0.3 * (a - eye) + tilt
     scene = hrt.Scene.from_arrays(corners.reshape(-1, 3), scene.faces)
     lists = lists_of(scene, camera, 14)
-    matrix, q = camera.pixel_from_world, {}
+    matrix, q = camera.arrays.m, {}
     for face in range(len(scene)):
         q[face] = [
             naive.projected(p, matrix, camera.eye) for p in scene.vertices[scene.faces[face]]
@@ -58,20 +58,20 @@ def planes_case(seed):
         x, y = F(columns[k] + at[0]), F(rows[k] + at[1])
         if np.isfinite(lists.planes[faces[k], DEPTH]):
             places.append((int(faces[k]), x, y))
-    return rng, camera, lists, q, places
+    return rng, lists, q, places
 
 
 def places_of(seeds):
     """Return what is known of each place in the cases of some seeds."""
     for seed in seeds:
-        rng, camera, lists, q, places = planes_case(seed)
+        rng, lists, q, places = planes_case(seed)
         for face, x, y in places:
-            yield rng, camera, lists, q[face], face, x, y
+            yield rng, lists, q[face], face, x, y
 
 
 def test_a_plane_errs_by_less_than_it_says():
     places, largest = 0, 0.0
-    for rng, camera, lists, corners, face, x, y in places_of(range(10)):
+    for rng, lists, corners, face, x, y in places_of(range(10)):
         places += 1
         row = lists.planes[face]
         a, b, c = row[SLOPE_X], row[SLOPE_Y], row[DEPTH]
@@ -81,7 +81,7 @@ def test_a_plane_errs_by_less_than_it_says():
         true_x, true_y = (
             Fraction(float(v)) + Fraction(o) for v, o in zip((x, y), off, strict=True)
         )
-        true = naive.plane_depth(corners, float(camera.near), true_x, true_y)
+        true = naive.plane_depth(corners, true_x, true_y)
         error = abs(Fraction(float(found)) - true)
         assert error < Fraction(float(row[ERROR])), (face, x, y)
         largest = max(largest, float(error) / float(row[ERROR]))
@@ -91,7 +91,7 @@ def test_a_plane_errs_by_less_than_it_says():
 
 def test_a_ray_is_never_apart_from_a_plane_that_it_meets():
     met = parted = 0
-    for rng, camera, lists, corners, face, x, y in places_of(range(100, 110)):
+    for rng, lists, corners, face, x, y in places_of(range(100, 110)):
         row = lists.planes[face]
         # A stretch of a ray, from s to s_exit inside of the pixel, and where in it it meets the
         # plane. The true ray is beside the walked one by a quarter of the margin.
@@ -104,7 +104,7 @@ def test_a_ray_is_never_apart_from_a_plane_that_it_meets():
         off = rng.choice([-0.25, 0.25], 2) * lists.margin_px
         true_x = Fraction(float(x0)) + Fraction(float(sx)) * sigma + Fraction(off[0])
         true_y = Fraction(float(y0)) + Fraction(float(sy)) * sigma + Fraction(off[1])
-        depth = naive.plane_depth(corners, float(camera.near), true_x, true_y)
+        depth = naive.plane_depth(corners, true_x, true_y)
         if not 0 < depth <= 1:
             continue
         sz = F(rng.choice([0.0, rng.uniform(-0.1, 0.1)]) * float(depth))

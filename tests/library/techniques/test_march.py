@@ -55,9 +55,7 @@ def test_agrees_with_the_oracle(seed, samples):
                 buffer.depth,
                 buffer.ddx,
                 buffer.ddy,
-                camera.pixel_from_world,
-                camera.eye,
-                camera.near,
+                camera,
             )
             total += 1
             if expected.margin < MARGIN:
@@ -156,9 +154,10 @@ def test_steps_are_counted_by_level():
     rng = np.random.default_rng(1)
     buffer = synthetic.random_gbuffer(rng, 37, 23)
     rays = synthetic.random_rays(rng, buffer, 500)
-    marched = through(rays, buffer)
-    assert marched.steps_by_level.shape == (len(hrt.build_depth_pyramid(buffer)),)
-    assert marched.steps_by_level.sum() == marched.steps.sum() > 0
+    screen = hrt.prepare(buffer, "paper")
+    by_level = screen.technique.steps_by_level(rays, screen)
+    assert by_level.shape == (len(hrt.build_depth_pyramid(buffer)),)
+    assert by_level.sum() == hrt.march(rays, screen).steps.sum() > 0
 
 
 def test_an_empty_view_is_crossed_in_few_steps():

@@ -33,8 +33,7 @@ def test_agrees_with_the_oracle_ray_for_ray(view):
         expected = naive.march(
             rays.origin[i], rays.direction[i], rays.pixel[i],
             float(rays.t_near[i]), float(rays.t_far[i]),
-            buffer.depth, buffer.ddx, buffer.ddy,
-            camera.pixel_from_world, camera.eye, camera.near,
+            buffer.depth, buffer.ddx, buffer.ddy, camera,
         )  # fmt: skip
         if expected.margin < 1e-5:
             continue

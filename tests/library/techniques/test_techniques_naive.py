@@ -85,9 +85,7 @@ def aimed_rays(rng, buffer, n):
 def compare(oracle, mode, names, buffer, rays):
     """Return how many rays could be compared, and hits among them; all that were agreed."""
     camera = buffer.camera
-    view = View(
-        buffer.depth, buffer.ddx, buffer.ddy, camera.pixel_from_world, camera.eye, camera.near
-    )
+    view = View(buffer.depth, buffer.ddx, buffer.ddy, camera)
     marched = through(rays, buffer, mode)
     parameters = {name: getattr(mode, name) for name in names}
     compared = hits = 0

@@ -202,6 +202,12 @@ SPECIAL = {
     ("Hits.checked", "faces"): lambda: len(scene()),
     ("Marched.checked", "n"): lambda: len(rays()),
     ("Marched.checked", "faces"): lambda: len(scene()),
+    ("save_cameras", "path"): lambda: "nowhere/views.toml",
+    ("save_cameras", "cameras"): lambda: {"a": camera()},
+    ("load_cameras", "path"): lambda: "nowhere.toml",
+    ("GBuffer.from_arrays", "depth"): lambda: 1.0 - gbuffer().depth,
+    ("GBuffer.from_arrays", "kind"): lambda: "standard",
+    ("GBuffer.from_arrays", "origin"): lambda: "top",
     ("Scene.from_arrays", "name"): lambda: "scene",
     ("Scene.from_meshes", "name"): lambda: "scene",
 }

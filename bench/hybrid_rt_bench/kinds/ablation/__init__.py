@@ -3,4 +3,4 @@
 from hybrid_rt_bench.judged import judging
 from hybrid_rt_bench.registry import register
 
-register(judging("ablation", __name__, spec=".spec:AblationExperiment", tables=".tables:tables"))
+register(judging("ablation", __name__, spec=".spec:AblationExperiment"))

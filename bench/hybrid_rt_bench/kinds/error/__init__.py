@@ -3,4 +3,4 @@
 from hybrid_rt_bench.judged import judging
 from hybrid_rt_bench.registry import register
 
-register(judging("error", __name__, spec=".spec:ErrorExperiment", tables=".tables:tables"))
+register(judging("error", __name__, spec=".spec:ErrorExperiment", frames="frame"))

@@ -3,4 +3,4 @@
 from hybrid_rt_bench.judged import judging
 from hybrid_rt_bench.registry import register
 
-register(judging("hybrid", __name__, spec=".spec:HybridExperiment", tables=".tables:tables"))
+register(judging("hybrid", __name__, spec=".spec:HybridExperiment"))

@@ -3,4 +3,4 @@
 from hybrid_rt_bench.judged import judging
 from hybrid_rt_bench.registry import register
 
-register(judging("lists", __name__, spec=".spec:ListsExperiment", tables=".tables:tables"))
+register(judging("lists", __name__, spec=".spec:ListsExperiment"))

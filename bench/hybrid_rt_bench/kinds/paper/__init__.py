@@ -11,6 +11,7 @@ register(
         run=".run:run_paper",
         schema=".columns:SCHEMA",
         tables=".tables:tables",
+        verdict=".verdict:verdict",
         figures=(".figures:plots", ".pictures:figures"),
         options=(*VIEWS, TECHNIQUES),
         compare=".compare:tables",

@@ -104,7 +104,9 @@ def measure_cell(
     for technique in techniques:
         result = hrt.trace_hybrid(rays, screens.of(technique), stages.tracer, threads=threads)
         found = quality.judge(rays, gbuffer, result, reference, loaded.truth)
-        steps_by_level[technique.name] = result.marched.steps_by_level
+        steps_by_level[technique.name] = technique.steps_by_level(
+            rays, screens.of(technique), threads=threads
+        )
         timed = _by_stage(rows, technique.name)
         results.append(
             {

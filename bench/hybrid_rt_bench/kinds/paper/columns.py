@@ -41,6 +41,9 @@ RATES = {
     "pixel_error": "a hit claimed more than a pixel from the truth, of the resolved rays",
 }
 
+NO_FAULT = ("tie", "reference_wrong")
+"""Rates that are no fault of a technique."""
+
 RATIOS = {
     "estimated": "Speed-up by the paper's formula, T_rt / (T_march + (1 - alpha) T_rt)",
     "measured": "Speed-up measured, T_rt / T_hybrid",
@@ -56,13 +59,17 @@ SCHEMA = Schema(
         count("rays", "Mirror rays"),
         count("resolved", "Rays that the screen answers", better="higher"),
         *estimate("alpha", "Share of rays that the screen answers", better="higher"),
-        *(column for name, meaning in RATES.items() for column in rate(name, meaning)),
+        *(
+            column
+            for name, meaning in RATES.items()
+            for column in rate(name, meaning, "" if name in NO_FAULT else "lower")
+        ),
         *(
             Column(f"error_{of}_{end}", f"Error of {words} of claimed hits, {end}", unit, "lower")
             for of, words, unit in (("t", "t over the true t", ""), ("px", "the pixel", "pixels"))
             for end in ("p50", "p99")
         ),
-        Column("steps_per_ray", "Samples of the screen a ray", better="lower"),
+        Column("steps_per_ray", "Samples of the screen per ray", better="lower"),
         *(
             column
             for stage, label in {**STAGES, "hybrid": "hybrid, its four stages"}.items()
@@ -76,7 +83,7 @@ SCHEMA = Schema(
             )
         ),
         count("rounds", "Measured rounds"),
-        Column("coverage_of_intervals", "Confidence that the intervals of times really have"),
+        Column("coverage_of_intervals", "Confidence that the intervals of times have, a share"),
         text("embree_path", "Embree's strongest path for the mirror rays"),
         text("embree_primary_path", "Embree's strongest path for the primary rays"),
     ),
@@ -84,8 +91,8 @@ SCHEMA = Schema(
         text("technique", "Name of the technique; empty for a stage that belongs to all"),
         text("stage", f"One of {', '.join(STAGES)}"),
         count("round", "Number of the round; below 0 for warm-up"),
-        Column("seconds", "What the stage took", "s", "lower"),
-        text("phase", "warmup or measured"),
+        Column("seconds", "Time of the stage", "s", "lower"),
+        text("phase", "Either warmup or measured"),
     ),
     verdicts=(
         text("technique", "Name of the technique"),

@@ -8,6 +8,11 @@ from __future__ import annotations
 
 RESOLUTIONS = ("1280x720", "1920x1080", "2560x1440", "3840x2160")
 
+MACHINE = "RTX 2080 Super"
+
+TRIANGLES = {"Sphere": "1000", "Sponza": "2^18", "Bistro": "2^20"}
+"""How many triangles the scenes of the paper have, about."""
+
 ALPHA = 0.31
 """Mean share of resolved rays."""
 

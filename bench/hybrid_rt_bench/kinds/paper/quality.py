@@ -46,7 +46,7 @@ def judge(
         result.hits,
         result.resolved,
         reference,
-        gbuffer.scene,
+        gbuffer.known_scene,
         gbuffer.camera,
         pixel=result.pixel,
         truth=truth,

@@ -1,4 +1,4 @@
-"""The tables of a run: the paper's three in the paper's shape, and what the paper leaves open."""
+"""The tables of a run: the paper's three in the paper's shape, and what else was measured."""
 
 from __future__ import annotations
 
@@ -8,20 +8,30 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from hybrid_rt.judging.rate import Rate
 from hybrid_rt_bench.kinds.paper import published as paper
 from hybrid_rt_bench.kinds.paper import summary
 from hybrid_rt_bench.kinds.paper.columns import STAGES
+from hybrid_rt_bench.report.scenes import scene_name
 from hybrid_rt_bench.report.style import ordered
 from hybrid_rt_bench.report.table import (
+    ABSENT,
+    DASH,
+    QUOTED,
     Table,
     interval,
     number,
+    rate_text,
+    share_text,
     threads_text,
 )
 from hybrid_rt_bench.results import statistics as stats
 from hybrid_rt_bench.results.folder import RunData
 
 Samples = dict[str, Any]
+
+VIEWS = ["scene", "camera", "width", "height"]
+"""Columns that tell views apart."""
 
 
 def tables(run: RunData) -> list[Table]:
@@ -43,22 +53,17 @@ def table_1(run: RunData) -> Table:
     """Return Table 1: the mean time of the march."""
     columns = _resolutions(run)
     table = Table("Table 1. March (SSRM), mean time in ms", ["", *columns])
-    for technique in _techniques(run):
-        rows = _of(run.results, technique=technique)
-        table.rows.append(
-            [
-                f"{_mode(technique)}, all scenes",
-                *_by_resolution(rows, columns, lambda r: number(r.march_ms.mean())),
-            ]
-        )
-        for scene in _scenes(run):
-            part = rows[rows.scene == scene]
-            cells = _by_resolution(part, columns, lambda r: number(r.march_ms.mean()))
-            table.rows.append([_label(run, scene), *cells])
-    table.rows.append(["paper, RTX 2080 Super", *_quote(paper.SSRM_MS, columns)])
+    parts = {"all scenes": common(run.results)}
+    parts |= {label(run, scene): of_scene(run, scene) for scene in scenes(run)}
+    for technique in techniques(run):
+        for name, part in parts.items():
+            rows = of_technique(part, technique)
+            cells = _by_resolution(rows, columns, lambda r: number(r.march_ms.mean()))
+            table.rows.append([f"{technique}: {name}", *cells])
+    table.rows.append([f"{QUOTED}, its own scenes", *_quote(paper.SSRM_MS, columns)])
     table.notes.append(
-        f"Mean over cameras of the median of the rounds; {_threads(run)}. One mirror ray for each "
-        "covered pixel."
+        f"Technique: scene. Mean over cameras of the median of the rounds; {_threads(run)}. One "
+        f"mirror ray for each covered pixel. The paper's: {paper.MACHINE}."
     )
     return table
 
@@ -67,15 +72,15 @@ def table_2(run: RunData) -> Table:
     """Return Table 2: the time of tracing every ray."""
     columns = _resolutions(run)
     table = Table("Table 2. Tracing every ray, strongest Embree, mean time in ms", ["", *columns])
-    rows = _of(run.results, technique=_techniques(run)[0])
-    for scene in _scenes(run):
+    rows = _views(run)
+    for scene in scenes(run):
         part = rows[rows.scene == scene]
         cells = _by_resolution(part, columns, _mean_of("embree_ms", np.mean))
-        table.rows.append([_label(run, scene), *cells])
+        table.rows.append([label(run, scene), *cells])
         _paper_row(table, run, scene, paper.RT_MS, columns)
     table.notes.append(
         "The fastest of all of Embree's paths for the cell's own rays, chosen in the same run (see "
-        f"the last table); {_threads(run)}. The paper: hardware ray tracing, RTX 2080 Super."
+        f"the last table); {_threads(run)}. The paper's: hardware ray tracing, {paper.MACHINE}."
     )
     return table
 
@@ -90,17 +95,17 @@ def table_3(run: RunData) -> Table:
         ("measured", lambda s, _: summary.measured_speedup(s)),
         ("measured, with the pyramid", lambda s, _: summary.measured_speedup(s, with_pyramid=True)),
     ]
-    for technique in _techniques(run):
-        for scene in _scenes(run):
-            table.rows.append([_label(run, scene, technique)])
-            for label, speedup in lines:
+    for technique in techniques(run):
+        for scene in scenes(run):
+            table.rows.append([f"{technique}: {label(run, scene)}"])
+            for line, speedup in lines:
                 cells = [
                     _speedup(run, scene, technique, resolution, speedup) for resolution in columns
                 ]
-                table.rows.append([label, *cells])
+                table.rows.append([line, *cells])
             _paper_row(table, run, scene, paper.SPEEDUP, columns, ", estimated, alpha 0.31")
     table.notes += [
-        "Estimated: T_rt / (T_march + (1 - alpha) T_rt). Measured: "
+        "Technique: scene. Estimated: T_rt / (T_march + (1 - alpha) T_rt). Measured: "
         "T_rt / (T_march + T_compaction + T_fallback + T_merge), all of one round.",
         "Geometric mean over cameras of the median of the rounds' paired ratios, "
         "[95 % bootstrap interval over rounds]. Above 1 the hybrid wins.",
@@ -112,87 +117,87 @@ def table_alpha(run: RunData) -> Table:
     """Return the share of resolved rays, for each scene and camera."""
     columns = _resolutions(run)
     table = Table("Alpha: share of rays that the screen answers", ["", *columns])
-    for technique in _techniques(run):
-        rows = _of(run.results, technique=technique)
 
-        def cells(part: pd.DataFrame) -> list[str]:
-            return _by_resolution(part, columns, lambda r: f"{r.alpha.mean():.3f}")
+    def cells(part: pd.DataFrame, technique: str) -> list[str]:
+        rows = of_technique(part, technique)
+        return _by_resolution(rows, columns, lambda r: f"{r.alpha.mean():.3f}")
 
-        for scene in _scenes(run):
-            part = rows[rows.scene == scene]
-            table.rows.append([_label(run, scene, technique)])
+    for technique in techniques(run):
+        for scene in scenes(run):
+            part = run.results[run.results.scene == scene]
+            table.rows.append([f"{technique}: {label(run, scene)}"])
             for camera in ordered(part.camera):
-                table.rows.append([camera, *cells(part[part.camera == camera])])
-            table.rows.append([f"{scene}, mean", *cells(part)])
-        table.rows.append(["mean of all", *cells(rows)])
-    table.rows.append(["paper, mean of all", *[f"{paper.ALPHA:.2f}" for _ in columns]])
+                table.rows.append([camera, *cells(part[part.camera == camera], technique)])
+            table.rows.append(["mean of the cameras", *cells(of_scene(run, scene), technique)])
+        whole = cells(common(run.results), technique)
+        table.rows += [[f"{technique}: all scenes"], ["mean of all views", *whole]]
+    table.rows.append([f"{QUOTED}, its own scenes", *[f"{paper.ALPHA:.2f}" for _ in columns]])
+    table.notes.append("Technique: scene. The paper gives one mean over scenes and sizes.")
     return table
 
 
 def table_errors(run: RunData) -> Table:
     """Return what the answers get wrong, for each scene and camera."""
     table = Table(
-        "Errors of the rays that the screen answers, by a float64 judge, %",
+        "Errors of the rays that the screen answers, by a float64 judge",
         [
             "",
             "resolved rays",
-            "false hit",
-            "false miss",
-            "wrong primitive",
-            "tie",
-            "wrong, of all",
-            "px p50",
-            "px p99",
+            "false hit, % of resolved rays",
+            "false miss, % of resolved rays",
+            "wrong primitive, % of resolved rays",
+            "tie, % of resolved rays",
+            "wrong, % of all rays",
+            "error, pixels, p50",
+            "error, pixels, p99",
         ],
         detail=True,
     )
-    for technique in _techniques(run):
-        for scene in _scenes(run):
-            table.rows.append([_short(run, scene, technique)])
-            rows = _of(_largest(run), technique=technique)
+    for technique in techniques(run):
+        for scene in scenes(run):
+            table.rows.append([f"{technique}: {scene_name(run, scene)}"])
+            rows = of_technique(_largest(run), technique)
             for _, row in rows[rows.scene == scene].iterrows():
-                kinds = ("false_hit", "false_miss", "wrong_primitive")
+                kinds = ("false_hit", "false_miss", "wrong_primitive", "tie", "wrong")
                 table.rows.append(
                     [
-                        f"{row.camera}, {int(row.width)}x{int(row.height)}",
+                        f"{row.camera}, {size_of(row)}",
                         f"{int(row.resolved):,}",
                         *(_rate(row, kind) for kind in kinds),
-                        number(100 * row.tie_rate),
-                        number(100 * row.wrong_rate),
                         number(row.error_px_p50, 2),
                         number(row.error_px_p99, 2),
                     ]
                 )
     table.notes += [
-        "Share of the resolved rays with its 95 % Clopper-Pearson interval, at each camera's "
-        "largest resolution.",
+        "Technique: scene, at each camera's largest resolution. Shares with their 95 % "
+        "Clopper-Pearson interval; none seen among N rays: at most 3 / N.",
         "False hit: more than a pixel from the truth, or none there. Wrong primitive: another "
         "triangle than the true one, within a pixel of the truth.",
-        "Wrong, of all: false hits and false misses among all rays of the cell.",
+        "Wrong: false hits and false misses among all rays of the cell.",
     ]
     return table
 
 
 def table_status(run: RunData) -> Table:
     """Return how the marches ended and how often each ending was wrong."""
-    table = Table("How the marches ended, %", ["", "of all rays", "false hit or miss, of resolved"])
-    for technique in _techniques(run):
-        for scene in _scenes(run):
-            part = _of(run.verdicts, technique=technique)
+    table = Table(
+        "How the marches ended",
+        ["", "rays, % of all rays", "false hits and misses, % of those resolved"],
+    )
+    for technique in techniques(run):
+        for scene in scenes(run):
+            part = of_technique(run.verdicts, technique)
             part = part[part.scene == scene]
             total = part["count"].sum()
-            table.rows.append([_label(run, scene, technique)])
+            table.rows.append([f"{technique}: {label(run, scene)}"])
             for status in ordered(part.status):
                 rows = part[part.status == status]
-                resolved = rows.loc[rows.verdict != "UNRESOLVED", "count"].sum()
+                resolved = int(rows.loc[rows.verdict != "UNRESOLVED", "count"].sum())
                 wrong = rows.loc[rows.verdict.isin(["FALSE_HIT", "FALSE_MISS"]), "count"].sum()
-                table.rows.append(
-                    [
-                        status.lower(),
-                        number(100 * rows["count"].sum() / total),
-                        number(100 * wrong / resolved) if resolved else "–",
-                    ]
-                )
+                rate = Rate.of(int(wrong), resolved)
+                share = number(100 * rows["count"].sum() / total)
+                table.rows.append([status.lower(), share, rate_text(rate)])
+    table.notes.append("Technique: scene. Shares with their 95 % interval.")
     return table
 
 
@@ -200,20 +205,28 @@ def table_raster(run: RunData) -> Table:
     """Return the raster against Embree's primary rays, and the pyramid against the march."""
     columns = _resolutions(run)
     table = Table("Raster against Embree's primary rays; pyramid against the march", ["", *columns])
-    rows = _of(run.results, technique=_techniques(run)[0])
+    rows = _views(run)
     lines: tuple[tuple[str, str, Callable[[Any], float]], ...] = (
         ("raster, ms", "raster_ms", np.mean),
         ("Embree primary, ms", "embree_primary_ms", np.mean),
         ("raster / Embree primary", "raster_over_embree", stats.geometric_mean),
+    )
+    own: tuple[tuple[str, str, Callable[[Any], float]], ...] = (
         ("pyramid, ms", "pyramid_ms", np.mean),
         ("pyramid / march", "pyramid_over_march", stats.geometric_mean),
     )
-    for scene in _scenes(run):
+    for scene in scenes(run):
         part = rows[rows.scene == scene]
-        table.rows.append([_label(run, scene)])
-        for label, column, mean in lines:
+        table.rows.append([label(run, scene)])
+        for line, column, mean in lines:
             values = _by_resolution(part, columns, _mean_of(column, mean))
-            table.rows.append([label, *values])
+            table.rows.append([line, *values])
+        for technique in techniques(run):
+            part = of_technique(run.results, technique)
+            part = part[part.scene == scene]
+            for line, column, mean in own:
+                values = _by_resolution(part, columns, _mean_of(column, mean))
+                table.rows.append([f"{technique}: {line}", *values])
     table.notes.append("Times: mean over cameras. Ratios: geometric mean of the paired ratios.")
     return table
 
@@ -222,21 +235,21 @@ def table_stages(run: RunData) -> Table:
     """Return the time of every stage, for each cell."""
     short = {"embree_primary": "Embree primary", "embree": "Embree mirror", "rays": "rays"}
     names = [short.get(stage, label) for stage, label in STAGES.items()]
-    columns = ["", *names, "hybrid", "steps a ray"]
+    columns = ["", *names, "hybrid", "steps per ray"]
     table = Table("Time of each stage, ms", columns, detail=True)
-    for technique in _techniques(run):
-        rows = _of(run.results, technique=technique)
-        for scene in _scenes(run):
-            table.rows.append([_short(run, scene, technique)])
+    for technique in techniques(run):
+        rows = of_technique(run.results, technique)
+        for scene in scenes(run):
+            table.rows.append([f"{technique}: {scene_name(run, scene)}"])
             for _, row in rows[rows.scene == scene].iterrows():
-                name = f"{row.camera}, {int(row.width)}x{int(row.height)}"
+                name = f"{row.camera}, {size_of(row)}"
                 times = [number(row[f"{stage}_ms"]) for stage in STAGES]
                 hybrid = interval(row.hybrid_ms, row.hybrid_ms_low, row.hybrid_ms_high)
                 table.rows.append([name, *times, hybrid, number(row.steps_per_ray)])
     first = run.results.iloc[0]
     table.notes.append(
-        f"Medians of {int(first.rounds)} rounds, stages interleaved, JIT compilation apart; "
-        f"[{100 * first.coverage_of_intervals:.0f} % order-statistic interval]."
+        f"Technique: scene. Medians of {int(first.rounds)} rounds, stages interleaved, JIT "
+        f"compilation apart; [{100 * first.coverage_of_intervals:.0f} % order-statistic interval]."
     )
     return table
 
@@ -245,17 +258,17 @@ def table_embree(run: RunData) -> Table:
     """Return which of Embree's paths was the strongest in each cell."""
     table = Table(
         "The strongest Embree of each cell",
-        ["", "mirror rays", "Mrays/s", "primary rays", "Mrays/s"],
+        ["", "path, mirror rays", "mirror, Mrays/s", "path, primary rays", "primary, Mrays/s"],
         detail=True,
     )
-    rows = _of(run.results, technique=_techniques(run)[0])
-    for scene in _scenes(run):
-        table.rows.append([scene])
+    rows = _views(run)
+    for scene in scenes(run):
+        table.rows.append([scene_name(run, scene)])
         for _, row in rows[rows.scene == scene].iterrows():
             pixels = row.width * row.height
             table.rows.append(
                 [
-                    f"{row.camera}, {int(row.width)}x{int(row.height)}",
+                    f"{row.camera}, {size_of(row)}",
                     row.embree_path,
                     number(row.rays / row.embree_ms / 1e3),
                     row.embree_primary_path,
@@ -265,13 +278,14 @@ def table_embree(run: RunData) -> Table:
     return table
 
 
-def samples_of(run: RunData, technique: str) -> Iterator[tuple[Any, Samples]]:
-    """Yield each results row of a technique with its measured samples by stage."""
+def samples_of(
+    run: RunData, technique: str, rows: pd.DataFrame | None = None
+) -> Iterator[tuple[Any, Samples]]:
+    """Yield each row of a technique, of all results or of `rows`, with its samples by stage."""
     measured = run.samples[run.samples.phase == "measured"]
-    keys = ["scene", "camera", "width", "height"]
-    groups = dict(list(measured.groupby(keys)))
-    for _, row in _of(run.results, technique=technique).iterrows():
-        group = groups[tuple(row[k] for k in keys)]
+    groups = dict(list(measured.groupby(VIEWS)))
+    for _, row in of_technique(run.results if rows is None else rows, technique).iterrows():
+        group = groups[tuple(row[k] for k in VIEWS)]
         group = group[group.technique.isin(["", technique])].sort_values("round")
         yield row, {str(stage): part.seconds.to_numpy() for stage, part in group.groupby("stage")}
 
@@ -285,11 +299,11 @@ def _speedup(
 ) -> str:
     ratios = [
         speedup(samples, row.alpha)
-        for row, samples in samples_of(run, technique)
-        if row.scene == scene and f"{int(row.width)}x{int(row.height)}" == resolution
+        for row, samples in samples_of(run, technique, of_scene(run, scene))
+        if size_of(row) == resolution
     ]
     if not ratios:
-        return "–"
+        return ABSENT
     mean = stats.geometric_mean_of_medians(ratios)
     return interval(mean.value, mean.low, mean.high)
 
@@ -305,7 +319,7 @@ def _by_resolution(
 ) -> list[str]:
     sizes = rows.width.astype(int).astype(str) + "x" + rows.height.astype(int).astype(str)
     parts = [rows[sizes == column] for column in columns]
-    return [cell(part) if len(part) else "–" for part in parts]
+    return [cell(part) if len(part) else ABSENT for part in parts]
 
 
 def _paper_row(
@@ -316,32 +330,30 @@ def _paper_row(
     columns: list[str],
     what: str = "",
 ) -> None:
-    row = _scene(run, scene)["row"]
-    if row in values:
-        table.rows.append([f"paper, {row}{what}", *_quote(values[row], columns)])
+    """Add what the paper has for a scene, if the scene is the paper's own."""
+    entry = _scene(run, scene)
+    row = str(entry["row"])
+    if row in values and not entry["builtin"]:
+        name = f"{QUOTED} {row}, about {paper.TRIANGLES[row]} triangles{what}"
+        table.rows.append([name, *_quote(values[row], columns)])
 
 
 def _quote(values: dict[str, float], columns: list[str]) -> list[str]:
-    return [f"{values[column]:g}" if column in values else "–" for column in columns]
+    return [f"{values[column]:g}" if column in values else DASH for column in columns]
 
 
-def _label(run: RunData, scene: str, technique: str | None = None) -> str:
-    entry = _scene(run, scene)
-    stands = f", {entry['row']}-class" if entry["row"] and entry["builtin"] else ""
-    label = f"{scene} ({_count(entry['triangles'])} triangles{stands})"
-    if technique is not None and len(_techniques(run)) > 1:
-        label += f", {_mode(technique)}"
-    return label
+def label(run: RunData, scene: str) -> str:
+    """Return a scene's name, its mark if it has one, and its number of triangles."""
+    return f"{scene_name(run, scene)}, {_count(_scene(run, scene)['triangles'])} triangles"
 
 
-def _short(run: RunData, scene: str, technique: str) -> str:
-    return f"{scene}, {_mode(technique)}" if len(_techniques(run)) > 1 else scene
+def size_of(row: Any) -> str:
+    """Return the size of a row's picture in words."""
+    return f"{int(row.width)}x{int(row.height)}"
 
 
 def _rate(row: Any, kind: str) -> str:
-    """Return a rate and its interval in per cent; a zero stays a zero."""
-    value, low, high = (100 * row[f"{kind}_{end}"] for end in ("rate", "low", "high"))
-    return f"{number(value)} [{number(low, 2)}, {number(high, 2)}]"
+    return share_text(*(float(row[f"{kind}_{end}"]) for end in ("rate", "low", "high")))
 
 
 def _mean_of(column: str, mean: Callable[[Any], float]) -> Callable[[pd.DataFrame], str]:
@@ -358,20 +370,36 @@ def _scene(run: RunData, scene: str) -> dict[str, Any]:
     return next(entry for entry in run.meta["scenes"] if entry["name"] == scene)
 
 
-def _scenes(run: RunData) -> list[str]:
+def scenes(run: RunData) -> list[str]:
+    """Return the names of the scenes."""
     return ordered(run.results.scene)
 
 
-def _techniques(run: RunData) -> list[str]:
+def techniques(run: RunData) -> list[str]:
+    """Return the names of the techniques."""
     return ordered(run.results.technique)
 
 
-def _mode(technique: str) -> str:
-    return f"mode {technique!r}"
-
-
-def _of(frame: pd.DataFrame, *, technique: str) -> pd.DataFrame:
+def of_technique(frame: pd.DataFrame, technique: str) -> pd.DataFrame:
+    """Return the rows of a technique."""
     return frame[frame.technique == technique]
+
+
+def common(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of the views that have every technique of `rows`; all rows if none has."""
+    of_view = rows.groupby(VIEWS)["technique"].transform("size")
+    whole = rows[of_view == rows["technique"].nunique()]
+    return whole if len(whole) else rows
+
+
+def of_scene(run: RunData, scene: str) -> pd.DataFrame:
+    """Return the rows of a scene, of the views that every technique measured there has."""
+    return common(run.results[run.results.scene == scene])
+
+
+def _views(run: RunData) -> pd.DataFrame:
+    """Return a row for each cell: what belongs to all techniques is the same in all of its rows."""
+    return run.results.drop_duplicates(VIEWS)
 
 
 def _largest(run: RunData) -> pd.DataFrame:

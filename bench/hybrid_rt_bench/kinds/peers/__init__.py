@@ -11,6 +11,7 @@ register(
         run=".run:run_peers",
         schema=".columns:SCHEMA",
         tables=".tables:tables",
+        verdict=".verdict:verdict",
         figures=(".figures:figures",),
         options=VIEWS,
         listing=".programs:listing",

@@ -214,7 +214,7 @@ def _draw(
 
     runners = _prepared(contenders, RASTER, prepare, on_pass)
     threads = next((c.opened.threads for c in contenders if c.opened), 1)
-    scene = gbuffer.scene
+    scene = gbuffer.known_scene
     _time(runners, lambda: hrt.rasterize(scene, camera, threads=threads), pixels, rounds)
     return runners
 
@@ -296,7 +296,7 @@ def _pair(
 
 
 def _timing_columns(rays: int, samples: list[Row]) -> Row:
-    """Return medians in milliseconds, and the median of the paired ratios of the times a ray."""
+    """Return medians in milliseconds, and the median of the paired ratios of the times per ray."""
     seconds = np.array([s["seconds"] for s in samples])
     other = np.array([s["beside"] / s["beside_rays"] for s in samples])
     middle = stats.median(1e3 * seconds)

@@ -7,13 +7,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from hybrid_rt_bench.report.table import Table, interval, number
+from hybrid_rt.judging.rate import Rate
+from hybrid_rt_bench.kinds.peers.columns import SCHEMA
+from hybrid_rt_bench.report.scenes import scene_name
+from hybrid_rt_bench.report.table import DASH, Table, interval, number, rate_text
+from hybrid_rt_bench.report.words import listed
 from hybrid_rt_bench.results import statistics as stats
 from hybrid_rt_bench.results.folder import RunData
 
-DASH = "–"
 RASTER = "raster"
-WHY = "not run, because"
 TRACED = ("mirror", "primary")
 """The workloads of rays."""
 
@@ -28,9 +30,9 @@ def rays(run: RunData) -> Table:
     """Return the rates of all peers, scene by scene, and how far they agree with robust Embree."""
     table = Table(
         "The same rays through other programs",
-        ["", "threads", "mirror, Mrays/s", "primary, Mrays/s", "time / strongest, mirror",
-         "cores busy", "same primitive, %", "largest error of t", "build, s", "peak memory, MiB",
-         WHY],
+        ["", "mirror, Mrays/s", "primary, Mrays/s", "time / strongest Embree's, mirror", "threads",
+         "cores busy", "same primitive, % of rays", "error of t, largest", "build, s",
+         "peak memory, MiB"],
     )  # fmt: skip
     for scene, part in by_scene(traced(run)):
         table.rows.append([scene_label(run, scene)])
@@ -38,68 +40,69 @@ def rays(run: RunData) -> Table:
             mirror = ok(rows[rows.workload == "mirror"])
             every = ok(rows)
             if every.empty:
-                table.rows.append([name, *[DASH] * (len(table.columns) - 2), _why(rows)])
+                table.rows.append(_not_run(table, name))
                 continue
             table.rows.append(
                 [
                     name + (f" ({every.rays.sum():,} rays)" if every.sampled.any() else ""),
-                    f"{int(every.threads.iloc[0])}",
                     number(rate(mirror)),
                     number(rate(ok(rows[rows.workload == "primary"]))),
-                    _ratio(run, mirror),
+                    ratio(run, mirror),
+                    f"{int(every.threads.iloc[0])}",
                     number(float(mirror.cores.mean()), 2) if len(mirror) else DASH,
                     _share(_pooled(every, "same")),
                     _power(float(every.t_max.max())),
                     number(float(every.build_seconds.iloc[0])),
                     number(float(every.peak_mib.iloc[0])),
-                    _why(rows),
                 ]
             )
     rounds, threads = run.meta["spec"]["rounds"], run.meta["environment"]["threads"]
     table.notes += [
         f"Mean over views ({views_text(run)}) of the median of {rounds} rounds; {threads} threads "
         "where a program takes a number. In each round a peer runs right beside the strongest "
-        "Embree on the same rays. Time a ray over that of the strongest Embree: geometric mean "
+        "Embree on the same rays. Time per ray over that of the strongest Embree: geometric mean "
         "over views of the median of the paired ratios, [95 % bootstrap interval over rounds]; "
         "the row embree is that against itself.",
         "Timed: from rays in a peer's own arrays to its evaluated results. Making those arrays, "
         "the first call (which compiles) and the way back to NumPy are not in it, and neither "
         "are the hybrid's lists and pyramid: see 'View by view'.",
         "Same primitive: the share of all rays, of both kinds, whose primitive (or miss) is that "
-        "of robust Embree. Largest error of t: |t - t_ref| / t_ref where it is the same.",
+        "of robust Embree. Error of t: |t - t_ref| / t_ref where it is the same.",
         "Cores busy: processor time of the whole process over wall time while mirror rays are "
         "traced; less than the threads where the machine was shared. Peak memory: of a process "
         "with the peer and a scene, over one with the scene alone; the peer's libraries are in it.",
     ]
-    return _with_reasons(table)
+    table.notes += _reasons(run, traced(run))
+    return table
 
 
 def pictures(run: RunData) -> Table:
     """Return the raster peers beside our raster."""
     table = Table(
         "The same picture by OpenGL on the processor",
-        ["", "threads", "draw, ms", "draw / ours", "read back, ms", "cores busy",
-         "same primitive, % of pixels", "depth off, p50", "p99", "largest", "first draw, ms", WHY],
+        ["", "draw, ms", "draw / ours", "read back, ms", "threads", "cores busy",
+         "same primitive, % of pixels", "depth off, p50", "depth off, p99", "depth off, largest",
+         "first draw, ms"],
     )  # fmt: skip
-    for scene, part in by_scene(run.results[run.results.workload == RASTER]):
+    every = drawn(run)
+    for scene, part in by_scene(every):
         table.rows.append([scene_label(run, scene)])
         for name, rows in _by_peer(part):
             done = ok(rows)
             if done.empty:
-                table.rows.append([name, *[DASH] * (len(table.columns) - 2), _why(rows)])
+                table.rows.append(_not_run(table, name))
                 continue
             table.rows.append(
                 [
                     name,
-                    f"{int(done.threads.iloc[0])}",
                     number(float(done.ms.mean())),
-                    _ratio(run, done),
+                    ratio(run, done),
                     number(float(done.read_ms.mean())),
+                    f"{int(done.threads.iloc[0])}",
                     number(float(done.cores.mean()), 2),
                     _share(_pooled(done, "same")),
                     *(_power(float(done[f"depth_{end}"].max())) for end in ("p50", "p99", "max")),
                     number(float(done.first_ms.max())),
-                    _why(rows),
                 ]
             )
     table.notes += [
@@ -111,19 +114,21 @@ def pictures(run: RunData) -> Table:
         "LP_NUM_THREADS is set to the number of threads. llvmpipe starts so many for its tiles; "
         "vertices, clipping and binning stay on the calling thread.",
     ]
-    return _with_reasons(table)
+    table.notes += _reasons(run, every)
+    return table
 
 
 def agreement(run: RunData) -> Table:
     """Return how the answers of each peer differ from those of robust Embree."""
     table = Table(
-        "How answers differ from those of robust Embree, % of rays",
-        ["", "rays", "differ", "other primitive at the same place", "hit before t_near",
-         "error of t, p99", "largest"],
+        "How answers differ from those of robust Embree",
+        ["", "rays", "differ, rays", "differ, % of rays",
+         "other primitive at the same place, % of rays", "hit before t_near, % of rays",
+         "error of t, p99", "error of t, largest"],
         detail=True,
     )  # fmt: skip
     for workload in TRACED:
-        rows = ok(run.results[run.results.workload == workload])
+        rows = ok(_whole(run.results[run.results.workload == workload]))
         if len(rows):
             table.rows.append([f"{workload} rays, all scenes"])
         for name, part in _by_peer(rows):
@@ -131,16 +136,18 @@ def agreement(run: RunData) -> Table:
                 [
                     name,
                     f"{int(part.rays.sum()):,}",
-                    f"{int(part.different.sum()):,} ({number(100 - 100 * _pooled(part, 'same'))})",
-                    number(100 * _pooled(part, "same_place")),
-                    number(100 * _pooled(part, "early")),
+                    f"{int(part.different.sum()):,}" if part.different.notna().any() else DASH,
+                    _rate(part.different, part.rays),
+                    _rate(part.same_place * part.rays, part.rays),
+                    _rate(part.early * part.rays, part.rays),
                     _power(float(part.t_p99.max())),
                     _power(float(part.t_max.max())),
                 ]
             )
     table.notes.append(
         "At the same place: both hit, and t differs by less than 1e-5 of it: a shared edge or a "
-        "duplicate. Before t_near: only our own calls can tell Embree where a ray begins to count."
+        "duplicate. Before t_near: only our own calls tell Embree from which t on a hit counts. "
+        "Shares with their 95 % interval; none seen among N rays: at most 3 / N."
     )
     return table
 
@@ -149,24 +156,33 @@ def views(run: RunData) -> Table:
     """Return every peer on every view."""
     table = Table(
         "View by view",
-        ["", "way", "ms", "Mrays/s", "time / strongest", "first call, ms", "before it, ms"],
+        [
+            "",
+            "ms",
+            "Mrays/s",
+            "time / strongest Embree's",
+            "first call, ms",
+            "before it, ms",
+            "way",
+        ],
         detail=True,
     )
     keys = ["scene", "camera", "width", "height", "workload"]
     for _, part in ok(run.results).groupby(keys, sort=False):
         one: Any = part.iloc[0]
         size = f"{int(one.width)}x{int(one.height)}"
-        table.rows.append([f"{one.scene}, {one.camera}, {size}, {one.workload}"])
+        name = scene_name(run, str(one.scene))
+        table.rows.append([f"{name}, {one.camera}, {size}, {one.workload}"])
         for _, row in part.iterrows():
             table.rows.append(
                 [
                     row.technique,
-                    row.label or DASH,
                     interval(row.ms, row.ms_low, row.ms_high),
                     number(row.rays / row.ms / 1e3),
                     interval(row.ratio, row.ratio_low, row.ratio_high),
                     number(row.first_ms),
                     number(row.convert_ms),
+                    row.label or DASH,
                 ]
             )
     table.notes.append(
@@ -179,21 +195,26 @@ def views(run: RunData) -> Table:
 
 def programs(run: RunData) -> Table:
     """Return what each peer is, and its version."""
-    table = Table("The programs", ["", "version", "what is called"], detail=True)
+    table = Table("The programs", ["", "version, and what is called"], detail=True, sentences=True)
     for peer in run.meta["peers"]:
         version = ", ".join(text for text in (peer["version"], peer["detail"]) if text)
-        table.rows.append([peer["name"], version, peer["description"]])
+        table.rows.append([peer["name"], f"{version or 'no version known'}; {peer['description']}"])
     return table
 
 
 def rate(rows: pd.DataFrame) -> float:
-    """Return millions of rays a second over all views, NaN for no view."""
+    """Return millions of rays per second over all views, NaN for no view."""
     return float(rows.rays.sum() / rows.ms.sum() / 1e3) if len(rows) else float("nan")
 
 
 def traced(run: RunData) -> pd.DataFrame:
-    """Return the rows of what traces rays."""
-    return run.results[run.results.workload != RASTER]
+    """Return the rows of what traces rays, with NaN for what no peer of the run could tell."""
+    return _whole(run.results[run.results.workload != RASTER])
+
+
+def drawn(run: RunData) -> pd.DataFrame:
+    """Return the rows of what draws, as `traced`."""
+    return _whole(run.results[run.results.workload == RASTER])
 
 
 def ok(rows: pd.DataFrame) -> pd.DataFrame:
@@ -210,12 +231,14 @@ def _by_peer(rows: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
     return [(str(name), part) for name, part in rows.groupby("technique", sort=False)]
 
 
-def _ratio(run: RunData, rows: pd.DataFrame) -> str:
+def ratio(run: RunData, rows: pd.DataFrame) -> str:
     """Return the geometric mean over views of the ratio of times, from the raw samples."""
     keys = ["scene", "camera", "width", "height", "technique", "workload"]
-    mine = run.samples.merge(rows[[*keys, "rays"]], on=keys) if len(rows) else pd.DataFrame()
+    if rows.empty or run.samples.empty:
+        return DASH
+    mine = run.samples.merge(rows[[*keys, "rays"]], on=keys)
     groups = []
-    for _, part in mine.groupby(keys, sort=False) if len(mine) else ():
+    for _, part in mine.groupby(keys, sort=False):
         seconds, rays, beside, amount = (
             part[c].to_numpy(np.float64) for c in ("seconds", "rays", "beside", "beside_rays")
         )
@@ -233,6 +256,8 @@ def _pooled(rows: pd.DataFrame, column: str) -> float:
 
 def _share(value: float) -> str:
     """Return a share near 1 in per cent, with as many nines as it has."""
+    if not np.isfinite(value):
+        return DASH
     return "100" if value == 1 else f"{100 * value:.4f}"
 
 
@@ -240,19 +265,32 @@ def _power(value: float) -> str:
     return DASH if not np.isfinite(value) else "0" if value == 0 else f"{value:.1e}"
 
 
-def _why(rows: pd.DataFrame) -> str:
-    """Return why a peer did not run, or not on all rays; empty if it did."""
-    return "; ".join(str(reason) for reason in dict.fromkeys(rows.reason[rows.state != "ok"]))
+def _whole(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return rows with all columns; those that are optional are absent where no peer has them."""
+    return rows.reindex(columns=list(dict.fromkeys([*SCHEMA.tables["results"], *rows.columns])))
 
 
-def _with_reasons(table: Table) -> Table:
-    """Return the table without its last column if that is empty."""
-    if not any(row[-1] for row in table.rows if len(row) > 1):
-        table.columns.pop()
-        for row in table.rows:
-            if len(row) > 1:
-                row.pop()
-    return table
+def _rate(counts: Any, rays: Any) -> str:
+    """Return the share of rays that were counted; a dash where nobody did."""
+    if counts.isna().all():
+        return DASH
+    return rate_text(Rate.of(round(float(counts.sum())), int(rays[counts.notna()].sum())))
+
+
+def _not_run(table: Table, name: str) -> list[str]:
+    return [name, "not run", *[DASH] * (len(table.columns) - 2)]
+
+
+def _reasons(run: RunData, rows: pd.DataFrame) -> list[str]:
+    """Return a sentence for each peer that did not run, or not on all rays, and why."""
+    lost = rows[rows.state != "ok"]
+    found: dict[tuple[str, str], list[str]] = {}
+    for (name, reason, scene), _ in lost.groupby(["technique", "reason", "scene"], sort=False):
+        found.setdefault((str(name), str(reason)), []).append(scene_name(run, str(scene)))
+    return [
+        f"{name} was not run on {listed(scenes)}: {reason or 'no reason is known'}."
+        for (name, reason), scenes in found.items()
+    ]
 
 
 def views_text(run: RunData) -> str:
@@ -265,7 +303,7 @@ def views_text(run: RunData) -> str:
 
 
 def scene_label(run: RunData, scene: str) -> str:
-    """Return a scene's name with its number of triangles."""
+    """Return a scene's name with its mark, if it has one, and its number of triangles."""
     n = next(int(e["triangles"]) for e in run.meta["scenes"] if e["name"] == scene)
     count = f"{n}" if n < 10_000 else f"{n / 1e3:.0f}k" if n < 1e6 else f"{n / 1e6:.2f}M"
-    return f"{scene} ({count} triangles)"
+    return f"{scene_name(run, scene)}, {count} triangles"

@@ -1,4 +1,4 @@
-"""What the certified march does, reads and takes, and what it may take on this machine."""
+"""What the certified march does, reads and takes on this machine, and where it breaks even."""
 
 from hybrid_rt_bench.options import VIEWS
 from hybrid_rt_bench.registry import Kind, register
@@ -11,6 +11,7 @@ register(
         run=".run:run_roofline",
         schema=".columns:SCHEMA",
         tables=".tables:tables",
+        verdict=".verdict:verdict",
         figures=(".figures:plots",),
         options=VIEWS,
     )

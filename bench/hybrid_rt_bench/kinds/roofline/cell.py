@@ -1,7 +1,7 @@
-"""Measure one view of kind "roofline": what the certified march does, takes and may take.
+"""Measure one view of kind "roofline": what the certified march does and takes, and its break-even.
 
 Round after round, on one thread and on all of them: the strongest Embree traces all rays, the
-hybrid marches them and hands over the rest to the same Embree, the rays are marched without
+hybrid marches them and hands the unresolved ones to the same Embree, the rays are marched without
 vectors, and a march of one step is timed, which is the set-up of every ray and the writing of its
 row. Beside it the raster draws the view, stage by stage, and the strongest Embree traces its
 primary rays. Ratios are taken inside a round.
@@ -127,7 +127,7 @@ class _Stages:
     threads: int
 
     def hybrid(self) -> hrt.HybridResult:
-        """March, and hand over the rest."""
+        """March, and hand over the unresolved rays."""
         return hrt.trace_hybrid(self.rays, self.screen, self.tracer, threads=self.threads)
 
     def round(self, number: int) -> dict[str, float]:
@@ -207,7 +207,7 @@ def work_columns(marched: hrt.Marched, screen: hrt.Screen) -> Row:
 
 
 def time_columns(samples: list[Row], rays: int) -> Row:
-    """Return medians in nanoseconds a ray, of the raster in ms, and of the paired ratios."""
+    """Return medians in nanoseconds per ray, of the raster in ms, and of the paired ratios."""
     seconds = {stage: np.array([s[stage] for s in samples]) for stage in roofline.STAGES}
     seconds["budget"] = roofline.budget(seconds)
     row: Row = {}

@@ -10,7 +10,7 @@ WORK = {
     "step_vectors": "Vectors of steps",
     "steps": "Steps, which read the pyramid",
     "passes": "Pixels left after they were looked at",
-    "refills": "Lanes that were given a ray to walk",
+    "refills": "Lanes that were given another ray to walk",
     "look_vectors": "Vectors of looks",
     "looks": "Pixels whose lists were looked at",
     "entry_vectors": "Vectors of entries",
@@ -23,6 +23,18 @@ WORK = {
 }
 BUSY = ("step", "look", "entry", "plane", "test")
 """The stages of the lanes."""
+
+STAGE_WORDS = {
+    "embree": "the strongest Embree, all rays",
+    "march": "the march",
+    "compaction": "the list of unresolved rays",
+    "fallback": "the strongest Embree, unresolved rays",
+    "merge": "the hits of the resolved rays",
+    "scalar": "the march without vectors",
+    "start": "a march of one step",
+    "budget": "the break-even march time; below 0, no march is fast enough",
+}
+"""What is told in nanoseconds per ray."""
 
 TIMED_MS = (*RASTER, "raster", "primary")
 
@@ -42,7 +54,7 @@ SCHEMA = Schema(
             for name in STRUCTURES
             for end, meaning, unit in (
                 ("bytes", "size of the working set", "bytes"),
-                ("gathered", "numbers gathered, of all rays", ""),
+                ("gathered", "32-bit elements gathered, of all rays", ""),
                 ("places", "places gathered from, of all rays", ""),
             )
         ),
@@ -50,17 +62,29 @@ SCHEMA = Schema(
         count("threads", "Threads of all stages"),
         *(
             column
-            for name in (*STAGES, "budget")
-            for column in estimate(f"{name}_ns", f"Median time a ray: {name}", "ns", "lower")
+            for name in STAGE_WORDS
+            for column in estimate(
+                f"{name}_ns",
+                f"Median time per ray: {STAGE_WORDS[name]}",
+                "ns",
+                "higher" if name == "budget" else "lower",
+            )
         ),
         *(
             column
             for name in TIMED_MS
             for column in estimate(f"{name}_ms", f"Median time: {name}", "ms", "lower")
         ),
-        *estimate("raster_speedup", "Embree's primary rays over the raster", "", "higher"),
-        *estimate("vectors_speedup", "March without vectors over the march", "", "higher"),
-        *estimate("speedup", "Embree for all rays over the hybrid", "", "higher"),
+        *estimate(
+            "raster_speedup", "Time of Embree's primary rays over that of the raster", "", "higher"
+        ),
+        *estimate(
+            "vectors_speedup",
+            "Time of the march without vectors over that of the march",
+            "",
+            "higher",
+        ),
+        *estimate("speedup", "Time of Embree for all rays over that of the hybrid", "", "higher"),
     ),
     samples=(
         count("threads", "Threads of all stages"),

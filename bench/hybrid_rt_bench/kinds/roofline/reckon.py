@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 STAGES = ("embree", "march", "compaction", "fallback", "merge", "scalar", "start")
 """What is timed in a round, seconds: Embree for all rays, the four stages of the hybrid (fallback
-is Embree for the rest), the march without vectors and a march of one step."""
+is Embree for the unresolved rays), the march without vectors and a march of one step."""
 
 RASTER = ("vertices", "cull", "records", "tiles")
 """Stages of the raster, as in `GBuffer.timings`; beside them are timed "raster", the whole, and
@@ -25,7 +25,7 @@ their corners, and its own slots."""
 
 
 def budget(seconds: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return what the march may take at most, for the hybrid to be as fast as Embree for all rays.
+    """Return the break-even march time: with it the hybrid is as fast as Embree for all rays.
 
     That is Embree's time for all rays less what the hybrid takes beside the march: a list of the
     unresolved rays, Embree for these from where they are handed over, the hits of the others.
@@ -34,7 +34,7 @@ def budget(seconds: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
 
 
 def ns_element(rates: Sequence[Mapping[str, Any]], size: float, threads: int) -> float:
-    """Return the time of a gathered number, ns of wall time, from a working set of `size` bytes.
+    """Return the time of a gathered 32-bit element, ns, from a working set of `size` bytes.
 
     Parameters
     ----------
@@ -54,9 +54,9 @@ def ns_element(rates: Sequence[Mapping[str, Any]], size: float, threads: int) ->
 
 
 def far_ns(rates: Sequence[Mapping[str, Any]], row: Mapping[str, Any], structure: str) -> float:
-    """Return what a ray's gathers from a structure would take alone, at random places, ns.
+    """Return what the gathers from a structure would take alone, at random places, ns per ray.
 
-    The first of the numbers that lie side by side is gathered at the rate of the working set, the
+    The first of the elements that lie side by side is gathered at the rate of the working set, the
     others at the fastest rate of all.
     """
     threads = int(row["threads"])
@@ -66,12 +66,12 @@ def far_ns(rates: Sequence[Mapping[str, Any]], row: Mapping[str, Any], structure
 
 
 def far_gathers_ns(rates: Sequence[Mapping[str, Any]], row: Mapping[str, Any]) -> float:
-    """Return what all gathers of a ray would take alone, at random places, ns."""
+    """Return what all gathers would take alone, at random places, ns per ray."""
     return sum(far_ns(rates, row, structure) for structure in STRUCTURES)
 
 
 def near_gathers_ns(rates: Sequence[Mapping[str, Any]], row: Mapping[str, Any]) -> float:
-    """Return what a ray's gathers would take at the fastest rate of all, ns: a lower bound.
+    """Return what the gathers would take at the fastest rate of all, ns per ray: a lower bound.
 
     The march's own slots are left out, which are a matter of how its work is put in order.
     """

@@ -84,7 +84,8 @@ class _Run:
         session.writer.add_cell({**keys, **record.details}, record.samples, record.results, [])
         row = record.results[-1]
         session.say_off_terminal(
-            f"{name}: march {row['march_ns']:.0f} ns a ray, may take {row['budget_ns']:.0f} ns, "
+            f"{name}: march {row['march_ns']:.0f} ns per ray, "
+            f"break-even {row['budget_ns']:.0f} ns, "
             f"Embree {row['embree_ns']:.0f} ns; measured speed-up {row['speedup']:.3f}"
         )
 

@@ -14,6 +14,7 @@ from hybrid_rt_bench.kinds.roofline.reckon import (
     near_gathers_ns,
     ns_element,
 )
+from hybrid_rt_bench.report.scenes import scene_name
 from hybrid_rt_bench.report.table import (
     Table,
     interval,
@@ -24,7 +25,8 @@ from hybrid_rt_bench.results.folder import RunData
 
 STAGES = ("step", "look", "entry", "plane", "test")
 NEVER = "none"
-"""What a march may take where Embree takes no longer for all rays than for the rest."""
+"""What stands for a break-even march time where Embree takes no longer for all rays than for the
+unresolved ones."""
 
 
 def tables(run: RunData) -> list[Table]:
@@ -34,12 +36,12 @@ def tables(run: RunData) -> list[Table]:
 
 
 def budgets(run: RunData) -> Table:
-    """Return what the march may take, and what it and its floors take of that."""
+    """Return the break-even march time, and what the march and its floors are of that."""
     table = Table(
-        "What the march may take, and what it takes",
-        ["", "alpha", "Embree, all", "Embree, rest", "list, merge", "may take", "march",
-         "march / may take", "set-up / may take", "near gathers / may take",
-         "far gathers / may take", "speed-up, measured"],
+        "The break-even march time, and what the march takes, ns per ray",
+        ["", "alpha", "Embree, all rays", "Embree, unresolved rays", "list, merge",
+         "break-even march", "march", "march / break-even", "set-up / break-even",
+         "near gathers / break-even", "far gathers / break-even", "speed-up, measured"],
     )  # fmt: skip
     for heading, rows in _groups(run):
         table.rows.append([heading])
@@ -61,10 +63,12 @@ def budgets(run: RunData) -> Table:
                 ]
             )
     table.notes += [
-        "Nanoseconds of wall time a mirror ray. Embree: the strongest of its paths for these rays. "
-        "Rest: the rays that the march leaves open, from where it hands them over. May take: "
-        "Embree for all rays, less Embree for the rest, the list of these and the hits of the "
-        "others: at a march / may take of 1 the hybrid is as fast as Embree alone, below it wins.",
+        "Nanoseconds of wall time over all mirror rays. Embree: the strongest of its paths for "
+        "these rays. Unresolved rays: those that the march does not answer, from where it hands "
+        "them over. Break-even: Embree for all rays, less Embree for the unresolved ones, the list "
+        "of these and the hits of the others; a march of that time makes the hybrid as fast as "
+        "Embree alone, and below a march / break-even of 1 the hybrid wins; where it is below 0 no "
+        f"march is fast enough, and its multiples are {NEVER}.",
         "Set-up: a march of one step. Near gathers: what gathers from the arrays of the view and "
         "the scene would take alone, at the fastest rate of any table; where this or set-up is "
         "above 1, a march that does this work by gathers cannot win here. Far gathers: all, at "
@@ -77,11 +81,12 @@ def budgets(run: RunData) -> Table:
 
 
 def parts(run: RunData) -> Table:
-    """Return what a ray and a step take, in lanes and without, and the floors."""
+    """Return the time per ray and per step, in lanes and without, and the floors."""
     table = Table(
         "The march's time",
-        ["", "march, ns a ray", "ns a step", "set-up, one step, write, ns", "near gathers, ns",
-         "far gathers, ns", "without vectors, ns", "vectors' speed-up"],
+        ["", "march, ns per ray", "march, ns per step", "set-up, one step, write, ns per ray",
+         "near gathers, ns per ray", "far gathers, ns per ray", "without vectors, ns per ray",
+         "vectors' speed-up"],
     )  # fmt: skip
     rates = run.meta["rates"]
     for heading, rows in _groups(run):
@@ -109,11 +114,11 @@ def parts(run: RunData) -> Table:
 
 
 def work(run: RunData) -> Table:
-    """Return what a ray does."""
+    """Return what is done per ray."""
     table = Table(
-        "The march's work, a ray",
+        "The march's work per ray",
         ["", "rays", "steps", "pixels looked at", "entries", "planes", "exact tests",
-         "numbers gathered", "bytes touched"],
+         "32-bit elements gathered", "bytes touched"],
     )  # fmt: skip
     for row in _rows(_once(run)):
         counted = (row.steps, row.looks, row.entries, row.planes, row.tests)
@@ -128,8 +133,8 @@ def work(run: RunData) -> Table:
             ]
         )
     table.notes.append(
-        "A pixel is looked at again after an exact test. Bytes touched: 4 for each number gathered "
-        "(those of the march's own slots are among them), the ray and its row of results."
+        "A pixel is looked at again after an exact test. Bytes touched: 4 for each element "
+        "gathered (those of the march's own slots are among them), the ray and its row of results."
     )
     return table
 
@@ -139,7 +144,7 @@ def busy(run: RunData) -> Table:
     once = _once(run)
     table = Table(
         f"Lanes at work, % of {int(once.lanes.iloc[0])}",
-        ["", *STAGES, "vectors a ray"],
+        ["", *STAGES, "vectors per ray"],
     )
     for row in _rows(once):
         vectors = sum(row[f"{stage}_vectors"] for stage in STAGES)
@@ -155,8 +160,8 @@ def busy(run: RunData) -> Table:
 def raster(run: RunData) -> Table:
     """Return what the raster of the views takes, stage by stage, beside Embree's primary rays."""
     table = Table(
-        "The raster's time",
-        ["", "Embree, primary rays", "raster", "primary / raster", *RASTER],
+        "The raster's time, ms per view",
+        ["", "Embree, primary rays", "raster", "Embree / raster", *RASTER],
     )
     for heading, rows in _groups(run):
         table.rows.append([heading])
@@ -171,7 +176,7 @@ def raster(run: RunData) -> Table:
                 ]
             )
     table.notes.append(
-        "Milliseconds a view: depth, derivatives and primitive of every pixel. Vertices: "
+        "Depth, derivatives and primitive of every pixel. Vertices: "
         "projecting them; cull: which faces may cover a pixel; records: their planes, and the "
         "tiles they are put into; tiles: drawing these and writing the images. Embree: the "
         "strongest of its paths for the primary rays."
@@ -184,9 +189,9 @@ def gathers(run: RunData) -> Table:
     counts = sorted(int(n) for n in run.results.threads.unique())
     table = Table(
         "Gathers",
-        ["", "working set, MiB", "numbers a ray", "places a ray",
-         *(f"ns a number, {threads_text(n)}" for n in counts),
-         *(f"ns a ray, {threads_text(n)}" for n in counts)],
+        ["", "working set, MiB", "32-bit elements per ray", "places per ray",
+         *(f"ns per element, {threads_text(n)}" for n in counts),
+         *(f"ns per ray, {threads_text(n)}" for n in counts)],
         detail=True,
     )  # fmt: skip
     rates = run.meta["rates"]
@@ -206,7 +211,7 @@ def gathers(run: RunData) -> Table:
                 ]
             )
     table.notes.append(
-        "Numbers that lie side by side, those of a plane and of a triangle's corners, are one "
+        "Elements that lie side by side, those of a plane and of a triangle's corners, are one "
         "place: the first is taken at the rate of the working set, the others at the fastest rate "
         "of any table. A working set is all of a structure, whatever a view reads of it."
     )
@@ -219,7 +224,7 @@ def machine(run: RunData) -> Table:
     counts = sorted(int(n) for n in rates.threads.unique())
     table = Table(
         "How fast the machine reads",
-        ["table, KiB", *(f"gathers, G numbers/s, {threads_text(n)}" for n in counts),
+        ["table, KiB", *(f"gathers, G elements/s, {threads_text(n)}" for n in counts),
          *(f"latency of a vector, ns, {threads_text(n)}" for n in counts),
          *(f"loads, GB/s, {threads_text(n)}" for n in counts)],
     )  # fmt: skip
@@ -244,7 +249,7 @@ def machine(run: RunData) -> Table:
 
 
 def of_budget(row: Any, ns: float) -> str:
-    """Return a time as a multiple of what the march may take."""
+    """Return a time as a multiple of the break-even march time."""
     return number(ns / row.budget_ns) if row.budget_ns > 0 else NEVER
 
 
@@ -252,7 +257,7 @@ def view(run: RunData, row: Any) -> str:
     """Return the name of a view; with its size where the run has several."""
     sizes = run.results[["width", "height"]].drop_duplicates()
     size = f", {int(row.width)}x{int(row.height)}" if len(sizes) > 1 else ""
-    return f"{row.scene}, {row.camera}{size}"
+    return f"{scene_name(run, str(row.scene))}, {row.camera}{size}"
 
 
 def _groups(run: RunData) -> list[tuple[str, pd.DataFrame]]:

@@ -14,6 +14,7 @@ register(
         run=".run:run_scaling",
         schema=".columns:SCHEMA",
         tables=".tables:tables",
+        verdict=".verdict:verdict",
         figures=(".figures:plots",),
         options=(SERIES, TRIANGLES, RESOLUTIONS, ROUNDS, TECHNIQUES),
         compare=".compare:tables",

@@ -74,7 +74,7 @@ class Visit:
     rows : list of dict
         Samples: technique, stage, round, seconds, phase.
     alpha, steps : dict of float
-        Share of rays that the screen answers, and steps a ray, by technique.
+        Share of rays that the screen answers, and steps per ray, by technique.
     peak : int or None
         Most bytes of memory during the visit; since the process began where the system cannot
         count from a visit on.

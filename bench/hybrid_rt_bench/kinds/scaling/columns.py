@@ -9,7 +9,7 @@ PLACE = (
     count("triangles", "Triangles of the scene"),
     count("threads", "Threads of all stages"),
     text("label", "Where the cell stands on its axis, in words"),
-    text("axis", "triangles, pixels or threads"),
+    text("axis", "One of triangles, pixels and threads"),
     count("rays", "Mirror rays"),
 )
 MEMORY = (
@@ -32,25 +32,27 @@ SCHEMA = Schema(
         *PLACE,
         *_WHAT,
         *estimate("ms", "Median time", "ms", "lower"),
-        Column("ns_per_ray", "Median time a ray", "ns", "lower"),
+        Column("ns_per_ray", "Median time per ray", "ns", "lower"),
         count("timed_rays", "Rays that this is of; 0 for a stage that has none"),
         count("rounds", "Measured rounds"),
         *MEMORY,
         Column("alpha", "Share of rays that the screen answers", better="higher"),
-        Column("steps_per_ray", "Samples of the screen a ray", better="lower"),
+        Column("steps_per_ray", "Samples of the screen per ray", better="lower"),
         text("embree_path", "Embree's strongest path"),
     ),
     samples=(
         *_WHAT,
         count("round", "Number of the round"),
-        Column("seconds", "What the stage took", "s", "lower"),
-        text("phase", "warmup or measured"),
+        Column("seconds", "Time of the stage", "s", "lower"),
+        text("phase", "Either warmup or measured"),
     ),
     cell=(
         *PLACE,
         *MEMORY,
         Column("peak_is_of_rounds", "Whether the peak is of the rounds alone", type=bool),
         text("embree_path", "Embree's strongest path"),
-        Column("compile_seconds", "Compiling, or loading what was compiled", "s"),
+        Column(
+            "compile_seconds", "Time of compiling, or of loading what was compiled", "s", "lower"
+        ),
     ),
 )

@@ -22,7 +22,7 @@ from hybrid_rt_bench.kinds.scaling.stages import (
     with_sums,
 )
 from hybrid_rt_bench.measure.errors import NothingToRunError
-from hybrid_rt_bench.measure.lifecycle import Outcome, Request, Session, carry_out
+from hybrid_rt_bench.measure.lifecycle import Outcome, Request, Session, carry_out, described
 from hybrid_rt_bench.measure.plan import Plan, find_scene, size_text
 
 FEW_THREADS = 8
@@ -251,6 +251,8 @@ class _Run:
         """Measure every series."""
         visits = self.experiment.rounds + 1  # to be made ready counts as one
         self.reporter.total(visits * sum(len(p.cells) for p in self.planned), "steps")
+        named = dict.fromkeys(planned.series.scene for planned in self.planned)
+        self.writer.meta["scenes"] += [described(find_scene(name), name) for name in named]
         for planned in self.planned:
             live: list[_Live] = []
             try:

@@ -31,7 +31,7 @@ STAGES: dict[str, str] = {
 """Every stage, those that are sums last, and what reports call it."""
 
 A_RAY = ("rays", "embree", "brute_force", *HYBRID_STAGES, "hybrid", "frame")
-"""The stages whose time is also told a ray."""
+"""The stages whose time is also told per ray."""
 
 Key = tuple[str, str]
 """Technique and stage."""
@@ -72,7 +72,7 @@ def with_sums(
 def rows_of(
     seconds: dict[Key, NDArray[np.float64]], rays: dict[str, int], default_rays: int
 ) -> list[dict[str, Any]]:
-    """Return a row of results for each stage: its median in milliseconds, and a ray.
+    """Return a row of results for each stage: its median in milliseconds, and per ray.
 
     Parameters
     ----------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
@@ -15,6 +16,8 @@ from hybrid_rt_bench.kinds.scaling.stages import (
     ordered,
 )
 from hybrid_rt_bench.report.table import (
+    ABSENT,
+    DASH,
     Table,
     interval,
     number,
@@ -43,7 +46,7 @@ def tables(run: RunData) -> list[Table]:
         part = of_series(run, name)
         axis = str(part.axis.iloc[0])
         if axis == "triangles":
-            found.append(growth(run, name))
+            found.append(growth_table(run, name))
         found.append(fitted(run, name))
         if axis == "threads":
             found.append(speedup(run, name))
@@ -79,36 +82,66 @@ def fixed(part: pd.DataFrame) -> str:
     return ", ".join(words)
 
 
-def growth(run: RunData, name: str) -> Table:
+@dataclass(frozen=True)
+class Growth:
+    """By how much the time of a stage grows between two sizes of a series.
+
+    Attributes
+    ----------
+    key : tuple of str
+        Technique and stage.
+    first_ms, last_ms : float
+        Medians at the two sizes.
+    ratio : Estimate
+        The last time over the first, paired by round.
+    per_ray : float
+        The same ratio of times per ray.
+    """
+
+    key: Key
+    first_ms: float
+    last_ms: float
+    ratio: stats.Estimate
+    per_ray: float
+
+
+def growths(run: RunData, name: str) -> list[Growth]:
+    """Return by how much march, hybrid and Embree grow from 2^14 to 2^23, or as was measured."""
+    part = of_series(run, name)
+    first, last = ends(part)
+    rounds, found = _rounds(run, name), []
+    for key in [key for key in stages_of(part) if key[1] in ("march", "hybrid", "embree")]:
+        rows = part[(part.technique == key[0]) & (part.stage == key[1])].set_index("x")
+        if first in rows.index and last in rows.index:
+            ratio = _paired(rounds, rows, key, first, last)
+            per_ray = float(ratio.value * rows.rays[first] / rows.rays[last])
+            found.append(Growth(key, rows.ms[first], rows.ms[last], ratio, per_ray))
+    return found
+
+
+def growth_table(run: RunData, name: str) -> Table:
     """Return by how much the times grow from 2^14 to 2^23 triangles, or as far as was measured."""
     part = of_series(run, name)
-    first, last = _ends(part)
-    labels = _labels(part)
+    first, last = ends(part)
+    names = labels(part)
     asked = f"2^{FROM.bit_length() - 1} to 2^{TO.bit_length() - 1}"
     whole = (first, last) == (FROM, TO)
     table = Table(
-        f"Growth from {labels[first]} to {labels[last]} triangles at a fixed view ({name})",
-        ["", f"{labels[first]}, ms", f"{labels[last]}, ms", "ratio [interval]", "of times a ray",
+        f"Growth from {names[first]} to {names[last]} triangles at a fixed view ({name})",
+        ["", f"{names[first]}, ms", f"{names[last]}, ms", "ratio [interval]", "ratio per ray",
          f"goal: < {GOAL}"],
     )  # fmt: skip
-    rounds = _rounds(run, name)
-    for key in [key for key in stages_of(part) if key[1] in ("march", "hybrid", "embree")]:
-        rows = part[(part.technique == key[0]) & (part.stage == key[1])].set_index("x")
-        if first not in rows.index or last not in rows.index:
-            continue
-        ratio = _paired(rounds, rows, key, first, last)
-        goal = ""
-        if key[1] == "march":
-            goal = _verdict(ratio) if whole else f"not said: {asked} not measured"
+    for found in growths(run, name):
+        goal = DASH
+        if found.key[1] == "march":
+            goal = goal_said(found.ratio) if whole else f"not said: {asked} not measured"
         table.rows.append(
             [
-                name_of(*key),
-                number(rows.ms[first]),
-                number(rows.ms[last]),
-                interval(ratio.value, ratio.low, ratio.high)
-                if ratio.count > 1
-                else f"{number(ratio.value)} [–]",
-                number(ratio.value * rows.rays[first] / rows.rays[last]),
+                name_of(*found.key),
+                number(found.first_ms),
+                number(found.last_ms),
+                ratio_text(found.ratio),
+                number(found.per_ray),
                 goal,
             ]
         )
@@ -121,11 +154,18 @@ def growth(run: RunData, name: str) -> Table:
     return table
 
 
+def ratio_text(ratio: stats.Estimate) -> str:
+    """Return a ratio with its interval, a dash for the interval of one round."""
+    if ratio.count > 1:
+        return interval(ratio.value, ratio.low, ratio.high)
+    return f"{number(ratio.value)} [{DASH}]"
+
+
 def fitted(run: RunData, name: str) -> Table:
     """Return the exponent that each stage grows with."""
     part = of_series(run, name)
     axis = AXES[str(part.axis.iloc[0])]
-    labels = _labels(part)
+    names = labels(part)
     table = Table(
         f"Exponents: time as a power of {axis} ({name})",
         ["", "exponent [95 %]", "upper half of the range [95 %]", "measured at", "ratio, ends"],
@@ -139,9 +179,9 @@ def fitted(run: RunData, name: str) -> Table:
         table.rows.append(
             [
                 name_of(*key),
-                _exponent(exponents.fit(rows.x, rows.ms)),
-                _exponent(upper) if above.sum() < len(rows) else "the same",
-                f"{labels[int(rows.x.iloc[0])]} to {labels[int(rows.x.iloc[-1])]}",
+                exponent_text(exponents.fit(rows.x, rows.ms)),
+                exponent_text(upper) if above.sum() < len(rows) else "the same",
+                f"{names[int(rows.x.iloc[0])]} to {names[int(rows.x.iloc[-1])]}",
                 number(rows.ms.iloc[-1] / rows.ms.iloc[0]),
             ]
         )
@@ -199,11 +239,11 @@ def times(run: RunData, name: str) -> Table:
 
 
 def times_a_ray(run: RunData, name: str) -> Table:
-    """Return the time a ray, in nanoseconds, all threads together."""
+    """Return the time per ray, in nanoseconds, all threads together."""
     part = of_series(run, name)
     keys = [key for key in stages_of(part) if key[1] in A_RAY]
     table = _over(
-        part, f"Times in ns a ray, all threads together ({name})", keys,
+        part, f"Times in ns per ray, all threads together ({name})", keys,
         lambda row: number(row.ns_per_ray),
     )  # fmt: skip
     counts = part.drop_duplicates("x")
@@ -212,8 +252,7 @@ def times_a_ray(run: RunData, name: str) -> Table:
     if len(brute):
         table.notes.append(
             f"Brute force: every triangle in float64, for a sample of {brute.timed_rays.max():,} "
-            "of the rays; not measured (a dash) where a round would take longer than the "
-            "experiment allows."
+            f"of the rays; {ABSENT} where a round would take longer than the experiment allows."
         )
     return table
 
@@ -222,8 +261,8 @@ def memory(run: RunData) -> Table:
     """Return the peak memory of every cell."""
     table = Table(
         "Peak memory of the process of each cell, MiB",
-        ["", "peak", "of that: program", "scene", "the rest", "rest, bytes a triangle",
-         "rest, bytes a pixel"],
+        ["", "peak", "of that: program", "scene", "all else", "all else, bytes per triangle",
+         "all else, bytes per pixel"],
         detail=True,
     )  # fmt: skip
     unsure = False
@@ -231,26 +270,26 @@ def memory(run: RunData) -> Table:
         table.rows.append([name])
         for cell in _cells(run, name):
             if not cell["peak_bytes"]:
-                table.rows.append([str(cell["label"]), "–"])
+                table.rows.append([str(cell["label"]), ABSENT])
                 continue
             unsure |= not cell["peak_is_of_rounds"]
-            rest = max(0, cell["peak_bytes"] - cell["program_bytes"] - cell["scene_bytes"])
+            other = max(0, cell["peak_bytes"] - cell["program_bytes"] - cell["scene_bytes"])
             table.rows.append(
                 [
                     str(cell["label"]),
                     *(
                         f"{value / MIB:,.0f}"
                         for value in (
-                            cell["peak_bytes"], cell["program_bytes"], cell["scene_bytes"], rest,
+                            cell["peak_bytes"], cell["program_bytes"], cell["scene_bytes"], other,
                         )
                     ),
-                    number(rest / cell["triangles"]),
-                    number(rest / (cell["width"] * cell["height"])),
+                    number(other / cell["triangles"]),
+                    number(other / (cell["width"] * cell["height"])),
                 ]
             )  # fmt: skip
     table.notes.append(
         "Each cell has a process of its own. Program: interpreter, libraries and compiled kernels. "
-        "Scene: triangles as loaded. The rest: Embree's structure, G-buffers with and without "
+        "Scene: triangles as loaded. All else: Embree's structure, G-buffers with and without "
         "lists, pyramids, rays and answers at their most in any round."
     )
     if unsure:
@@ -262,9 +301,9 @@ def memory(run: RunData) -> Table:
 
 
 def answers(run: RunData) -> Table:
-    """Return alpha and steps a ray of each technique: what the times were spent on."""
+    """Return alpha and steps per ray of each technique: what the times were spent on."""
     table = Table(
-        "Share of rays that the screen answers, and steps a ray", ["", "alpha", "steps a ray"],
+        "Share of rays that the screen answers, and steps per ray", ["", "alpha", "steps per ray"],
         detail=True,
     )  # fmt: skip
     marches = run.results[run.results.stage == "march"]
@@ -302,12 +341,12 @@ def paths(run: RunData) -> Table:
 
 
 def _over(part: pd.DataFrame, title: str, keys: list[Key], text: Callable[[Any], str]) -> Table:
-    labels = _labels(part)
-    table = Table(title, ["", *labels.values()])
+    names = labels(part)
+    table = Table(title, ["", *names.values()])
     for technique, stage in keys:
         rows = part[(part.technique == technique) & (part.stage == stage)]
         by_x = {int(row.x): text(row) for _, row in rows.iterrows()}
-        table.rows.append([name_of(technique, stage), *[by_x.get(x, "–") for x in labels]])
+        table.rows.append([name_of(technique, stage), *[by_x.get(x, ABSENT) for x in names]])
     return table
 
 
@@ -316,12 +355,13 @@ def _cells(run: RunData, name: str) -> list[dict[str, Any]]:
     return sorted(cells, key=lambda cell: int(cell["x"]))
 
 
-def _labels(part: pd.DataFrame) -> dict[int, str]:
+def labels(part: pd.DataFrame) -> dict[int, str]:
+    """Return what the places of a series are called."""
     rows = part.drop_duplicates("x")
     return {int(x): str(label) for x, label in zip(rows.x, rows.label, strict=True)}
 
 
-def _ends(part: pd.DataFrame) -> tuple[int, int]:
+def ends(part: pd.DataFrame) -> tuple[int, int]:
     """Return the sizes nearest to FROM and TO that were measured, from inside where possible."""
     sizes = sorted(int(x) for x in set(part.x))
     inside = [x for x in sizes if FROM <= x <= TO] or sizes
@@ -354,25 +394,26 @@ def _paired(
     return stats.median(paired.to_numpy())
 
 
-def _verdict(ratio: stats.Estimate) -> str:
-    """Return whether the goal is reached, and if the interval says so too or too few rounds ran."""
+def goal_said(ratio: stats.Estimate) -> str:
+    """Tell whether the goal is reached, and if the interval says so too or too few rounds ran."""
     held = ratio.value < GOAL
     sure = ratio.coverage >= SURE and (ratio.high < GOAL if held else ratio.low > GOAL)
     return ("held" if held else "missed") + ("" if sure else ", by its median alone")
 
 
-def _exponent(found: exponents.Exponent) -> str:
+def exponent_text(found: exponents.Exponent) -> str:
+    """Return an exponent with its interval, a dash for what too few sizes do not give."""
     if math.isnan(found.value):
-        return "–"
+        return DASH
     if math.isinf(found.low):
-        return f"{found.value:.2f} [–]"
+        return f"{found.value:.2f} [{DASH}]"
     return f"{found.value:.2f} [{found.low:.2f}, {found.high:.2f}]"
 
 
 def _log_exponent(part: pd.DataFrame) -> str:
     sizes = part.drop_duplicates("x").x.to_numpy(float)
     if len(sizes) < 2 or sizes.min() < 2:
-        return "–"
+        return DASH
     return f"{exponents.fit(sizes, [math.log(x) for x in sizes]).value:.2f}"
 
 

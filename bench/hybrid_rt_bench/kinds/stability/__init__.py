@@ -13,6 +13,7 @@ register(
         run=".run:run_stability",
         schema=".columns:SCHEMA",
         tables=".tables:tables",
+        verdict=".verdict:verdict",
         figures=(".figures:figures",),
         options=(CASES, TECHNIQUES),
     )

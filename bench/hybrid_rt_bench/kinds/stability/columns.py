@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from hybrid_rt_bench.results.schema import Schema, count, flag, text
+from hybrid_rt_bench.results.schema import Better, Schema, count, flag, text
+
+BETTER: dict[str, Better] = {"correct": "higher", "tie": ""}
 
 SCHEMA = Schema(
     keys=(text("case", "Name of the hard case"),),
     results=(
         text("technique", "Name of the technique, or of the tracer"),
-        text("state", "pass, fail or error"),
+        text("state", "One of pass, fail and error"),
         flag("exact", "Whether it is held to exact answers"),
         count("rays", "Rays of the case"),
-        count("unresolved", "Rays without an answer"),
+        count("unresolved", "Rays without an answer", better="lower"),
         *(
-            count(name, meaning, better="" if name in ("correct", "tie") else "lower")
+            count(name, meaning, better=BETTER.get(name, "lower"))
             for name, meaning in {
                 "correct": "Right answers",
                 "tie": "Another primitive as near as the true one",

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from hybrid_rt_bench.report.table import Table, percent
+from hybrid_rt.judging.rate import Rate
+from hybrid_rt_bench.report.table import ABSENT, Table, number, rate_text
 from hybrid_rt_bench.results.folder import RunData
 
 COUNTS = ("false_hit", "false_miss", "wrong_primitive", "imprecise", "false_free")
@@ -13,15 +14,17 @@ COUNTS = ("false_hit", "false_miss", "wrong_primitive", "imprecise", "false_free
 
 def tables(run: RunData) -> list[Table]:
     """Return every table of the run, in the order of reading."""
-    return [summary(run), verdicts(run), unresolved(run), offenders(run), what_goes_wrong(run)]
+    made = [summary(run), verdicts(run), unresolved(run), offenders(run), what_goes_wrong(run)]
+    return [table for table in made if table.rows]
 
 
 def summary(run: RunData) -> Table:
     """Return one row a technique: cases passed, and the sums over all cases."""
     table = Table(
         "The hard set, summed over its cases",
-        ["", "cases passed", "no answers", "rays", "resolved", "tie", "false hit", "false miss",
-         "wrong primitive", "imprecise t"],
+        ["", "cases passed", "no answers, cases", "rays", "resolved, % of rays",
+         "false hits and misses, % of resolved rays", "false hit", "false miss", "wrong primitive",
+         "imprecise t", "tie"],
     )  # fmt: skip
     for technique, rows in run.results.groupby("technique", sort=False):
         rays, resolved = rows.rays.sum(), (rows.rays - rows.unresolved).sum()
@@ -31,13 +34,15 @@ def summary(run: RunData) -> Table:
                 f"{(rows.state == 'pass').sum()} of {len(rows)}",
                 str((rows.unresolved == rows.rays).sum()),
                 f"{rays:,}",
-                percent(resolved / rays),
-                *(f"{rows[kind].sum():,}" for kind in ("tie", *COUNTS[:4])),
+                number(100 * resolved / rays),
+                rate_text(Rate.of(int((rows.false_hit + rows.false_miss).sum()), int(resolved))),
+                *(f"{rows[kind].sum():,}" for kind in (*COUNTS[:4], "tie")),
             ]
         )
     table.notes += [
         "A case is passed if none of the rays that a technique answers is a false hit (more than a "
-        "pixel from the truth) or a false miss. No answers: cases of which it answers no ray.",
+        "pixel from the truth) or a false miss. No answers: cases of which it answers no ray. "
+        "[95 % interval; none seen among N rays: at most 3 / N].",
         "Exact: held to the right primitive and to t as float32 can know it as well, and to proven "
         "hand-over distances.",
     ]
@@ -48,19 +53,22 @@ def verdicts(run: RunData) -> Table:
     """Return pass or fail for each case and technique."""
     table = Table("Which cases each technique passes", ["", *entrants(run)])
     for case, rows in by_case(run):
-        table.rows.append([case, *(_verdict(row) for row in rows)])
-    table.notes.append("FAIL: wrong answers / answers given. The first wrong rays are in "
-                       "results.csv.")  # fmt: skip
+        verdicts = {row.technique: _verdict(row) for row in rows}
+        table.rows.append([case, *(verdicts.get(name, ABSENT) for name in entrants(run))])
+    table.notes.append(
+        "FAIL: wrong answers / resolved rays. Pass (none): no ray was resolved. The first wrong "
+        "rays are in results.csv."
+    )
     return table
 
 
 def unresolved(run: RunData) -> Table:
     """Return the share of rays without an answer for each case and technique that marches."""
     marching = [name for name in entrants(run) if not name.startswith("embree")]
-    table = Table("Share of rays left unresolved", ["", *marching], detail=True)
+    table = Table("Unresolved rays, % of the rays of a case", ["", *marching], detail=True)
     for case, rows in by_case(run):
-        shares = {row.technique: row.unresolved / row.rays for row in rows}
-        table.rows.append([case, *(f"{100 * shares[name]:.1f} %" for name in marching)])
+        shares = {row.technique: f"{100 * row.unresolved / row.rays:.1f}" for row in rows}
+        table.rows.append([case, *(shares.get(name, ABSENT) for name in marching)])
     return table
 
 
@@ -85,7 +93,7 @@ def what_goes_wrong(run: RunData) -> Table:
     """Return what each case is about."""
     table = Table(
         "The cases", ["", "rays", "triangles", "hits", "ambiguous in float32", "what goes wrong"],
-        detail=True,
+        detail=True, sentences=True,
     )  # fmt: skip
     for cell in run.meta["cells"]:
         if cell["state"] == "measured":

@@ -16,7 +16,7 @@ def test_cameras_of_the_default_scene_in_the_order_of_its_nodes(tmp_path):
     g.add("cameras", type="perspective", name="lens", perspective=LENS)
     g.add("cameras", type="perspective", perspective={**LENS, "aspectRatio": 1.5, "zfar": 100})
     g.add(
-        "cameras", type="orthographic", orthographic={"xmag": 1, "ymag": 1, "znear": 0, "zfar": 1}
+        "cameras", type="orthographic", orthographic={"xmag": 1.5, "ymag": 3, "znear": 0, "zfar": 9}
     )
     half = math.sqrt(0.5)
     below = g.node(False, camera=1, translation=[0, 0, 5], name="below")
@@ -24,7 +24,7 @@ def test_cameras_of_the_default_scene_in_the_order_of_its_nodes(tmp_path):
     g.node(camera=0, translation=[1, 2, 3])
     g.node(camera=2)
     g.node(False, camera=0)
-    first, second = read_cameras(g.write(tmp_path / "m.glb"))
+    first, second, third = read_cameras(g.write(tmp_path / "m.glb"))
     assert first.name == "below"
     assert first.eye == pytest.approx((15, 0, 0))
     assert first.target == pytest.approx((14, 0, 0))
@@ -35,6 +35,7 @@ def test_cameras_of_the_default_scene_in_the_order_of_its_nodes(tmp_path):
     assert second.target == pytest.approx((1, 2, 2))
     assert second.up == (0, 1, 0)
     assert (second.aspect, second.zfar) == (None, None)
+    assert (third.yfov, third.ymag, third.aspect, third.znear, third.zfar) == (None, 3, 0.5, 0, 9)
 
 
 def test_files_without_cameras(tmp_path):
@@ -58,6 +59,26 @@ def test_lenses_that_make_no_sense(tmp_path, lens):
     g.add("cameras", type="perspective", perspective=lens)
     g.node(camera=0)
     with pytest.raises(hrt.MeshFileError, match=r"m\.glb: cameras\[0\]\.perspective: "):
+        read_cameras(g.write(tmp_path / "m.glb"))
+
+
+@pytest.mark.parametrize(
+    "lens", [{"xmag": 0, "ymag": 1, "znear": 0, "zfar": 1}, {"xmag": 1, "ymag": 1, "znear": 0},
+             {"xmag": 1, "ymag": 1, "znear": 2, "zfar": 1}]
+)  # fmt: skip
+def test_orthographic_lenses_that_make_no_sense(tmp_path, lens):
+    g = Gltf()
+    g.add("cameras", type="orthographic", orthographic=lens)
+    g.node(camera=0)
+    with pytest.raises(hrt.MeshFileError, match=r"m\.glb: cameras\[0\]\.orthographic: "):
+        read_cameras(g.write(tmp_path / "m.glb"))
+
+
+def test_a_lens_of_no_known_type(tmp_path):
+    g = Gltf()
+    g.add("cameras", type="fisheye", perspective=LENS)
+    g.node(camera=0)
+    with pytest.raises(hrt.MeshFileError, match=r"m\.glb: cameras\[0\]\.type: expected 'pers"):
         read_cameras(g.write(tmp_path / "m.glb"))
 
 

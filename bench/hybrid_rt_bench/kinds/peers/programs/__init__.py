@@ -15,7 +15,7 @@ PEERS = {
     for peer in (
         Peer(EMBREE, "The strongest path of ours through Embree", ("embreex",), ours.Embree),
         Peer(
-            "hybrid", "Our march in mode certified, then the strongest Embree", (),
+            "hybrid", "Our march, technique certified, then the strongest Embree", (),
             ours.Hybrid, alone=False,
         ),
         Peer("embreex", "EmbreeScene.run as it is, one thread", ("embreex",), ours.EmbreexRun),

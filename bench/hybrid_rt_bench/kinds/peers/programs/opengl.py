@@ -73,18 +73,17 @@ class Llvmpipe(Opened):
         os.environ["LP_NUM_THREADS"] = str(threads)
         os.environ["LIBGL_ALWAYS_SOFTWARE"] = "true"
         os.environ["GALLIUM_DRIVER"] = "llvmpipe"
-        libraries = {
+        libraries: dict[str, Any] = {
             f"lib{name.lower()}": file
             for name in ("EGL", "GL")
             if (file := ctypes.util.find_library(name)) is not None
         }
-        self._context = moderngl.create_context(
-            standalone=True, backend="egl", require=450, **libraries
-        )
+        settings: dict[str, Any] = {"backend": "egl", **libraries}
+        self._context = moderngl.create_context(standalone=True, require=450, **settings)
         renderer = self._context.info["GL_RENDERER"]
         if "llvmpipe" not in renderer:
             raise PeerError(f"expected Mesa's llvmpipe behind EGL, got {renderer}")
-        self._gl = _functions(libraries.get("libegl", "libEGL.so.1"))
+        self._gl = functions(libraries.get("libegl", "libEGL.so.1"))
         self.detail = f"{renderer}, {self._context.info['GL_VERSION']}"
         start = time.perf_counter()
         self._program = self._context.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
@@ -162,7 +161,7 @@ class Llvmpipe(Opened):
             self._frame = None
 
 
-def _functions(library: str) -> dict[str, Any]:
+def functions(library: str) -> dict[str, Any]:
     """Return functions of OpenGL by name, as EGL finds them."""
     find = ctypes.CDLL(library).eglGetProcAddress
     find.restype, find.argtypes = ctypes.c_void_p, [ctypes.c_char_p]

@@ -55,7 +55,7 @@ class EmbreexThreads(Opened):
 
 
 class Hybrid(Opened):
-    """The march in mode "certified", then the strongest Embree for what it leaves open."""
+    """The march of technique "certified", then the strongest Embree for the unresolved rays."""
 
     def __init__(self, scene: hrt.Scene, threads: int) -> None:
         self.scene, self.threads = scene, threads
