@@ -23,6 +23,7 @@ from hybrid_rt_bench.judged.columns import CELL, EMBREE, POINT, WRONG
 from hybrid_rt_bench.judged.pooling import Pooled, pareto, pools
 from hybrid_rt_bench.report.alike import alike
 from hybrid_rt_bench.report.looks import GREY, looks
+from hybrid_rt_bench.report.scenes import scene_name
 from hybrid_rt_bench.report.style import footer, legend, ordered, panels, save_all, title, told
 from hybrid_rt_bench.results.folder import RunData
 
@@ -107,7 +108,7 @@ def speed_by_scene(run: RunData) -> Figure:
     for ax, (scene, some) in zip(axes, dots.items(), strict=True):
         _draw(ax, some, ordered(run.results["technique"]), break_even=True, small=True,
               scale_of=every)  # fmt: skip
-        title(ax, scene, 3.3, fontweight="bold")
+        title(ax, scene_name(run, scene), 3.3, fontweight="bold")
     figure.supylabel("measured speed-up over the strongest Embree", fontsize=11)
     for ax in axes[-columns:]:
         ax.set_xlabel("wrong answers, % of all rays")

@@ -83,7 +83,7 @@ def test_with_the_mesh_it_counts_what_the_raster_counts(run, dump, drawn):
     by_technique = data.verdicts.groupby("technique")["count"].sum()
     assert set(by_technique) == {len(rays)}
     names = {path.rpartition("/")[2] for path in summary["files"]}
-    assert {"tables.md", "statuses.png", "errors.png"} <= names
+    assert {"tables.md", "statuses.png", "statuses.svg", "errors.png", "errors.svg"} <= names
 
 
 def test_without_the_mesh_it_tells_alpha_and_statuses_and_says_so(run, dump):
@@ -116,7 +116,7 @@ def test_maps_show_each_ray_where_it_starts(drawn):
     hit = np.argwhere(status == hrt.MarchStatus.HIT)[0]
     assert tuple(image[tuple(hit)]) == (0xC8, 0xC8, 0xC8)
     assert (image[status == NOWHERE] == 255).all()
-    assert list(figures.STATUSES) == [s.name for s in hrt.MarchStatus]
+    assert [s.name for s in hrt.MarchStatus] == figures.NAMES
 
 
 def test_the_pictures_have_the_frames_pixels(run, dump):

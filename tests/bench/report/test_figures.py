@@ -90,6 +90,9 @@ def test_every_text_is_whole_and_clear_and_says_what_was_measured(
             assert "×" in said, name
             for scene in layout.scenes:
                 assert scene.replace(" ", "") in said, name
+            if made_runs.LONG in layout.scenes:  # which is not whole
+                assert f"{made_runs.LONG}(partial)" in said, name
+                assert "atenthofitstrianglesareabsent" in said, name
         if kind in ("paper", "judged", "stability", "peers", "maps of errors"):
             some = layout.techniques if kind != "maps of errors" else layout.techniques[:-1]
             for technique in some:
