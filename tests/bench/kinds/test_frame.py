@@ -83,7 +83,7 @@ def test_with_the_mesh_it_counts_what_the_raster_counts(run, dump, drawn):
     by_technique = data.verdicts.groupby("technique")["count"].sum()
     assert set(by_technique) == {len(rays)}
     names = {path.rpartition("/")[2] for path in summary["files"]}
-    assert {"tables.md", "statuses.png", "errors.png"} <= names
+    assert {"tables.md", "statuses.png", "statuses.svg", "errors.png", "errors.svg"} <= names
 
 
 def test_without_the_mesh_it_tells_alpha_and_statuses_and_says_so(run, dump):
