@@ -15,4 +15,5 @@ def judging(name: str, package: str, spec: str, tables: str) -> Kind:
         tables=tables,
         figures=("hybrid_rt_bench.judged.figures:plots", "hybrid_rt_bench.judged.maps:figures"),
         options=(*VIEWS, TECHNIQUES),
+        compare="hybrid_rt_bench.judged.compared:COMPARED",
     )

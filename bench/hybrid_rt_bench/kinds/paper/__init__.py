@@ -13,6 +13,6 @@ register(
         tables=".tables:tables",
         figures=(".figures:plots", ".pictures:figures"),
         options=(*VIEWS, TECHNIQUES),
-        compare=".compare:tables",
+        compare=".compared:COMPARED",
     )
 )

@@ -13,6 +13,7 @@ register(
         tables=".tables:tables",
         figures=(".figures:figures",),
         options=VIEWS,
+        compare=".compared:COMPARED",
         listing=".programs:listing",
     )
 )

@@ -13,5 +13,6 @@ register(
         tables=".tables:tables",
         figures=(".figures:plots",),
         options=VIEWS,
+        compare=".compared:COMPARED",
     )
 )

@@ -16,6 +16,6 @@ register(
         tables=".tables:tables",
         figures=(".figures:plots",),
         options=(SERIES, TRIANGLES, RESOLUTIONS, ROUNDS, TECHNIQUES),
-        compare=".compare:tables",
+        compare=".compared:COMPARED",
     )
 )

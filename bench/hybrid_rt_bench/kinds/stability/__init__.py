@@ -15,5 +15,6 @@ register(
         tables=".tables:tables",
         figures=(".figures:figures",),
         options=(CASES, TECHNIQUES),
+        compare=".compared:COMPARED",
     )
 )
