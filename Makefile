@@ -19,6 +19,7 @@ help:
 	@echo "make fuzz       junk at every argument of the public API, and damaged mesh files, all of it"
 	@echo "make corpus COLLECTIONS='NAME=FOLDER ...'  compare mesh readers over public collections"
 	@echo "make cold-start  seconds that the first picture waits for compilation"
+	@echo "make compare-aa  runs of one program and of a slower one: what \`hybrid-rt compare\` says"
 	@echo "make clean      remove .venv and caches"
 
 $(STAMP): pyproject.toml
@@ -69,3 +70,7 @@ clean:
 .PHONY: cold-start
 cold-start: $(STAMP)
 	$(BIN)/python bench/cold_start.py
+
+.PHONY: compare-aa
+compare-aa: $(STAMP)
+	$(BIN)/python bench/compare_aa.py

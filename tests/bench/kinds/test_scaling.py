@@ -622,5 +622,5 @@ def test_runs_without_a_common_cell_or_of_other_kinds_are_not_compared(tmp_path)
     with pytest.raises(hrt.ArgumentError, match="none in common"):
         compare_runs([a], [b])
     paper = dataclasses.replace(b, meta={**b.meta, "kind": "paper"})
-    with pytest.raises(hrt.ArgumentError, match="of one kind .*'scaling'.* of kind 'paper'"):
+    with pytest.raises(hrt.ArgumentError, match=r"of one kind .*'scaling'.* of kind 'paper'"):
         compare_runs([a], [paper])

@@ -120,6 +120,20 @@ def test_with_one_run_a_side_it_is_said_what_is_not_known(three):
     assert "With 1 and 2 runs" in verdict(compare_runs(three[:1], three[1:]))
 
 
+def test_a_stage_that_is_over_in_no_time_is_not_judged(three):
+    run = three[0]
+    short = run.samples.stage == "merge"
+    factor = np.where(short, 0.1, 1.0)
+    shrunk = run.samples.assign(seconds=run.samples.seconds * factor)
+    before = dataclasses.replace(run, samples=shrunk)
+    # Where the scheduler takes its core away in most rounds it only seems to be long.
+    found = compare_runs([before], [run])
+    merge = [change for change in found.groups if change.timing == "merge"]
+    assert [change.judged for change in merge] == [False, False]
+    assert all(change.effect.ratio > 5 for change in merge)
+    assert not any(change.timing == "merge" for change in found.changes)
+
+
 def test_counts_are_compared_exactly(three, tmp_path):
     found = compare_runs(three, [made(tmp_path, 5, alpha=0.401)])
     assert found.changed
@@ -194,7 +208,7 @@ def test_what_cannot_be_compared_is_refused(three):
     with pytest.raises(hrt.ArgumentError, match="at least one run"):
         compare_runs([], three)
     other = dataclasses.replace(run, meta={**run.meta, "kind": "error"})
-    with pytest.raises(hrt.ArgumentError, match="of one kind .*'paper'.*'error'"):
+    with pytest.raises(hrt.ArgumentError, match=r"of one kind .*'paper'.*'error'"):
         compare_runs([run], [other])
     broken = dataclasses.replace(run, samples=run.samples.assign(seconds=-1.0))
     with pytest.raises(ReportsError, match="not positive"):

@@ -1,5 +1,6 @@
 """Which changes are reported: on samples made up with what runs of one program differ by."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -14,8 +15,8 @@ CELLS, ROUNDS, TIMES = 8, 11, 10
 def side(rng, runs, changes, noisy=1.0, busy=0.0):
     """Return the sides of `TIMES` times: runs, cells and rounds scatter, and the machine is busy.
 
-    The logarithm of each time is shifted by `changes`. What all cells of a run share, what each has,
-    and what a busy machine leaves in a normalised time are drawn anew for every run.
+    The logarithm of each time is shifted by `changes`. What all cells of a run share, what each
+    has, and what a busy machine leaves in a normalised time are drawn anew for every run.
     """
     load = busy * np.abs(rng.normal(size=(runs, 1)))
     baseline = math.log(0.05) + load + rng.normal(0, 0.02, (runs, CELLS))
@@ -110,8 +111,7 @@ def test_a_baseline_that_changed_is_not_believed_to_cancel():
 
 def test_another_path_of_the_baseline_is_a_doubt():
     other = plain([0.1])
-    doubtful = Side(*(getattr(other, name) for name in ("level", "variance", "baseline", "scatter",
-                                                        "seconds")), np.zeros(1, np.bool_))  # fmt: skip
+    doubtful = dataclasses.replace(other, same_path=np.zeros(1, np.bool_))
     assert effect(plain([0.0]), doubtful).error > effect(plain([0.0]), other).error
 
 

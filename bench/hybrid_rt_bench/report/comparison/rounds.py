@@ -128,7 +128,7 @@ def middles(rounds: pd.DataFrame, place: Sequence[str]) -> pd.DataFrame:
         Indexed by `place`: ``level``, the logarithm of the time over its baseline (of the seconds
         where there is none); ``variance``, of that middle; ``seconds``, the median; ``baseline``,
         the logarithm of its median, and ``scatter``, the deviation of that from round to round, NaN
-        where there is none.
+        where there is none; ``shorter``, the fastest round of either.
     """
     rows = []
     for key, part in rounds.groupby(list(place), sort=False):
@@ -137,6 +137,7 @@ def middles(rounds: pd.DataFrame, place: Sequence[str]) -> pd.DataFrame:
         level, variance = middle(seconds, np.ones(len(seconds)) if raw else baseline)
         beside = np.log(baseline)  # all NaN where there is none
         found = (float(np.median(seconds)), float(np.median(beside)), deviation(beside))
-        rows.append((*key, level, variance, *found))
-    columns = [*place, "level", "variance", "seconds", "baseline", "scatter"]
+        shorter = float(np.fmin(seconds.min(), np.exp(beside.min())))
+        rows.append((*key, level, variance, *found, shorter))
+    columns = [*place, "level", "variance", "seconds", "baseline", "scatter", "shorter"]
     return pd.DataFrame(rows, columns=columns).set_index(list(place))
