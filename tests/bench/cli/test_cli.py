@@ -138,7 +138,7 @@ def test_report_renders_an_old_run_and_compare_compares_it(finished, monkeypatch
     with pytest.raises(SystemExit) as stopped:
         cli.main()
     assert stopped.value.code == 0
-    assert "no difference shown" in capsys.readouterr().out
+    assert "No change" in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -59,13 +59,38 @@ def test_every_part_of_a_kind_is_found(name):
     kind = kinds[name]
     assert kind.spec_class().model_fields["kind"].default == name
     assert kind.columns().key_names
-    parts = [kind.runner(), kind.table_maker(), *kind.figure_makers(), kind.comparer()]
-    assert all(callable(part) for part in parts if part is not None)
+    parts = [kind.runner(), kind.table_maker(), *kind.figure_makers()]
+    assert all(callable(part) for part in parts)
     assert kind.experiments()
     assert all(column.meaning for columns in kind.columns().tables.values()
                for column in columns.values())  # fmt: skip
     changes = {option.parameter for option in kind.options if option.changes}
     assert changes <= {"resolutions", "rounds", "techniques"}
+
+
+@pytest.mark.parametrize("name", kinds.names())
+def test_what_is_compared_of_a_kind_are_columns_of_its_schema(name):
+    compared, schema = kinds[name].compared(), kinds[name].columns()
+    results = {**schema.tables["results"], **schema.tables["cell"]}
+    assert set(compared.exact) | set(compared.names) <= set(results) | {"threads"}
+    assert set(compared.cell) <= set(results)
+    assert {column for column, _ in compared.loose} <= set(results)
+    samples = schema.tables["samples"]
+    assert bool(compared.timings) == bool(samples)
+    if samples:
+        assert set(compared.names) <= set(samples)
+    assert sum(not timing.baseline for timing in compared.timings) in (0, 1, 2)
+    for timing in compared.timings:
+        assert timing.amount in {"", *results}
+        assert timing.baseline_amount in {"", *samples}
+        if not compared.stage:
+            assert {*timing.columns, timing.baseline} <= {"", *samples}
+    # Whatever is counted is held to be the same, or is known not to be.
+    counted = {c.name for c in schema.results if c.type is int} - {*compared.names, *compared.cell}
+    settings = {"rounds", "timed_rays", "threads"}
+    memory = {"peak_bytes", "program_bytes", "scene_bytes"}
+    made_of_work = {c for c in counted if c.endswith(("_gathered", "_places"))}
+    assert counted - set(compared.exact) <= settings | memory | made_of_work
 
 
 def test_an_unknown_kind_is_answered_with_the_nearest():
