@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from hybrid_rt_bench.judged import columns as judged
+from hybrid_rt_bench.kinds.frame import columns as frame
 from hybrid_rt_bench.kinds.paper import columns as paper
 from hybrid_rt_bench.kinds.paper import summary
 from hybrid_rt_bench.kinds.peers import columns as peers
@@ -190,6 +191,41 @@ def judged_run(out, layout, kind="error", zeros=False, timed=True):
             verdicts = [{"technique": t, "point": "default", "status": "HIT", "verdict": "CORRECT",
                          "count": rays} for t in measured]  # fmt: skip
             writer.add_cell(cell, samples, rows, verdicts, picture)
+    return _done(writer)
+
+
+def frame_run(out, layout, judged=True):
+    """Return a run of a depth buffer of someone's own, with its mesh or, not judged, without."""
+    about = {
+        "file": "dump.npz", "dtype": "float32", "reading": {"kind": "reversed"}, "covered": 0.83,
+        "mesh": f"{layout.scenes[0]}.obj" if judged else None, "unmatched": 3, "uncertain": True,
+        "uncertainty": 1e-6,
+    }  # fmt: skip
+    writer = _writer(out, "frame", frame.SCHEMA, layout, frame=about)
+    width, height = layout.sizes[0]
+    rays = width * height
+    for workload in ("mirror", "ambient_occlusion"):
+        rows, verdicts, picture = [], [], {"grey": np.full((90, 160), 120, np.uint8)}
+        for technique in layout.techniques:
+            alpha = 0.1 + 0.6 * _share(technique, workload)
+            resolved = int(alpha * rays)
+            row = {
+                "technique": technique, "judged": judged, "rays": rays, "resolved": resolved,
+                "hits": resolved, "false_hit": rays // 90, "alpha": alpha, "steps": 20 * rays,
+                "wrong_rate": rays // 90 / resolved, "wrong_low": 0.001, "wrong_high": 0.02,
+            }  # fmt: skip
+            rows.append(whole(frame.SCHEMA, "results", row))
+            verdict = "CORRECT" if judged else frame.UNJUDGED
+            verdicts += [
+                {"technique": technique, "status": status, "verdict": verdict, "count": rays // 2}
+                for status in ("HIT", "HIDDEN")
+            ]
+            picture[f"status_{technique}"] = _squares(9)
+            if judged:
+                picture[f"classes_{technique}"] = _squares(6)
+        cell = {"scene": layout.scenes[0], "camera": "own", "width": width, "height": height}
+        kept = picture if workload == "mirror" else None
+        writer.add_cell({**cell, "workload": workload}, [], rows, verdicts, kept)
     return _done(writer)
 
 

@@ -14,6 +14,7 @@ from hybrid_rt_bench.judged import bars
 from hybrid_rt_bench.judged import figures as judged
 from hybrid_rt_bench.judged import maps as judged_maps
 from hybrid_rt_bench.judged.columns import EMBREE, MAP_CLASSES
+from hybrid_rt_bench.kinds.frame import figures as frame
 from hybrid_rt_bench.kinds.paper import figures as paper
 from hybrid_rt_bench.kinds.paper import pictures as paper_pictures
 from hybrid_rt_bench.kinds.peers import figures as peers
@@ -34,6 +35,7 @@ KINDS = {
     "stability": (made_runs.stability_run, [stability.figures]),
     "scaling": (made_runs.scaling_run, [scaling.plots]),
     "roofline": (made_runs.roofline_run, [roofline.plots]),
+    "frames": (made_runs.frame_run, [frame.figures]),
     "maps of errors": (made_runs.judged_run, [judged_maps.figures]),
     "the paper's pictures": (made_runs.paper_run, [paper_pictures.figures]),
 }
@@ -48,7 +50,7 @@ def drawn(monkeypatch, run, makers):
         found[stem.name] = figure
         return [stem]
 
-    for module in (style, judged_maps, paper_pictures):
+    for module in (style, judged_maps, paper_pictures, frame):
         monkeypatch.setattr(module, "save", keep)
     for make in makers:
         make(run, run.folder)

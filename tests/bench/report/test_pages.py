@@ -29,6 +29,7 @@ JUDGED = ("error", "ablation", "hybrid", "lists")
 MADE = {
     "paper": made_runs.paper_run,
     **{kind: functools.partial(made_runs.judged_run, kind=kind) for kind in JUDGED},
+    "frame": made_runs.frame_run,
     "peers": made_runs.peers_run,
     "roofline": made_runs.roofline_run,
     "scaling": made_runs.scaling_run,
