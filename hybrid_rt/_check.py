@@ -79,6 +79,15 @@ def array(
         raise ArgumentError(argument, f"{expected} that memory can hold", describe(arr)) from error
 
 
+def reals(argument: str, value: Any) -> NDArray[np.float64]:
+    """Return `value`, real numbers in an array of any shape or alone, as float64."""
+    try:
+        shape = np.shape(value)
+    except Exception as error:  # of lists that are ragged, of somebody's own __array__
+        raise ArgumentError(argument, "an array of numbers", describe(value)) from error
+    return array(argument, value, shape, np.float64).reshape(shape)
+
+
 def owned(
     argument: str, value: Any, shape: tuple[int | str, ...], dtype: type[np.generic]
 ) -> NDArray[Any]:

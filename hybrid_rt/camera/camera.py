@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -25,7 +25,7 @@ ORTHONORMAL = 1e-9
 
 
 @dataclass(frozen=True)
-class Camera:
+class Camera(ABC):
     """A view of W by H pixels; make one with a method named below.
 
     `look_at` and `from_intrinsics` return a `Pinhole`, `orthographic` an `Orthographic`, and
@@ -298,9 +298,12 @@ class Camera:
 
     def _across(self, x: Any, y: Any) -> tuple[F64, F64]:
         """Return places of the screen in units of right and up, (N, 1) each."""
+        across = _check.array("x", x, ("N",), np.float64)
+        down = _check.array("y", y, ("N",), np.float64)
+        _check.same_length("y", down, "x", len(across))
         (fx, fy), (cx, cy) = self.scale_px, self.centre_px
-        x_v = (np.asarray(x, np.float64) - cx) / fx
-        y_v = (cy - np.asarray(y, np.float64)) / fy
+        with np.errstate(all="ignore"):
+            x_v, y_v = (across - cx) / fx, (cy - down) / fy
         return np.asarray(x_v[:, None]), np.asarray(y_v[:, None])
 
     @abstractmethod
@@ -334,7 +337,7 @@ class Camera:
         """
 
     @abstractmethod
-    def towards(self, points_w: F64) -> F64:
+    def towards(self, points_w: Any) -> F64:
         """Return the directions, (N, 3) float64, in which points (N, 3) are seen."""
 
     @abstractmethod

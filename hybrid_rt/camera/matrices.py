@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid_rt import _check
+from hybrid_rt.camera.camera import LARGEST_SIDE
 from hybrid_rt.camera.orthographic import Orthographic
 from hybrid_rt.camera.parts import vector_of
 from hybrid_rt.camera.pinhole import Pinhole
@@ -45,8 +46,8 @@ def camera_of(
     _check.choice("convention", convention, tuple(ENDS))
     rotation, shift = _rigid(_finite("view", view))
     lens = _lens(_finite("projection", projection), convention)
-    columns = _check.integer("width", width, least=1)
-    rows = _check.integer("height", height, least=1)
+    columns = _check.integer("width", width, least=1, most=LARGEST_SIDE)
+    rows = _check.integer("height", height, least=1, most=LARGEST_SIDE)
     # A negative scale turns the axis, not the number.
     across, down = lens.scale
     eye, forward = vector_of(-shift @ rotation), vector_of(lens.ahead * rotation[2])
@@ -82,9 +83,7 @@ def calibrated(
     turned = _rotation("R", _finite("R", rotation, (3, 3)), "R")
     if np.linalg.det(turned) < 0:
         raise ArgumentError("R", "a rotation", "a rotation with a reflection (its det is -1)")
-    if np.shape(translation) == (3, 1):
-        translation = np.reshape(translation, 3)
-    t = _finite("t", translation, (3,))
+    t = _column("t", translation)
     if k[0, 1] != 0.0:
         raise ArgumentError("K", "no skew, K[0, 1] = 0", f"a skew of {k[0, 1]:g}")
     if k[1, 0] != 0.0 or (k[2] != (0.0, 0.0, 1.0)).any():
@@ -92,8 +91,8 @@ def calibrated(
     fx, fy = float(k[0, 0]), float(k[1, 1])
     if not (fx > 0.0 and fy > 0.0):
         raise ArgumentError("K", "focal lengths K[0, 0] and K[1, 1] > 0", f"{fx:g} and {fy:g}")
-    columns = _check.integer("width", width, least=1)
-    rows = _check.integer("height", height, least=1)
+    columns = _check.integer("width", width, least=1, most=LARGEST_SIDE)
+    rows = _check.integer("height", height, least=1, most=LARGEST_SIDE)
     # Centres of pixels are whole numbers there, and halves here.
     shift_px = k[0, 2] + 0.5 - 0.5 * columns, k[1, 2] + 0.5 - 0.5 * rows
     return Pinhole(
@@ -124,6 +123,12 @@ def _finite(argument: str, value: Any, shape: tuple[int, ...] = (4, 4)) -> F64:
     if not np.isfinite(matrix).all():
         raise ArgumentError(argument, "finite numbers", "an infinity or NaN")
     return matrix
+
+
+def _column(argument: str, value: Any) -> F64:
+    """Return three numbers, which may stand below each other."""
+    shape = (3, 1) if isinstance(value, np.ndarray) and value.shape == (3, 1) else (3,)
+    return _finite(argument, value, shape).reshape(3)
 
 
 def _rotation(argument: str, matrix: F64, what: str) -> F64:

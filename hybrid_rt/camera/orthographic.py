@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from hybrid_rt import _check
-from hybrid_rt.camera.camera import Camera
+from hybrid_rt.camera.camera import LARGEST_SIDE, Camera
 from hybrid_rt.camera.parts import checked_lens
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels.arrays import F64, ViewArrays
@@ -105,18 +105,21 @@ class Orthographic(Camera):
 
     def z_view(self, depth: Any) -> F64:
         """Return distances from the eye along `forward`, float64, of depths, array_like."""
-        return np.asarray(self.far - np.asarray(depth, np.float64) * self.extent)
+        with np.errstate(all="ignore"):
+            return np.asarray(self.far - _check.reals("depth", depth) * self.extent)
 
     def depth_at(self, z_view: Any) -> F64:
         """Return depths, float64, of distances from the eye along `forward`, array_like."""
-        return np.asarray((self.far - np.asarray(z_view, np.float64)) / self.extent)
+        with np.errstate(all="ignore"):
+            return np.asarray((self.far - _check.reals("z_view", z_view)) / self.extent)
 
     def views(self, x: Any, y: Any) -> tuple[F64, F64]:
         """Return the lines of sight through places of the screen; see `Camera.views`."""
         x_v, y_v = self._across(x, y)
-        origin = np.asarray(
-            np.array(self.eye) + x_v * np.array(self.right) + y_v * np.array(self.up)
-        )
+        with np.errstate(all="ignore"):
+            origin = np.asarray(
+                np.array(self.eye) + x_v * np.array(self.right) + y_v * np.array(self.up)
+            )
         return origin, np.broadcast_to(np.array(self.forward), origin.shape)
 
     def primary(self, x: Any, y: Any) -> tuple[F64, F64, float, float]:
@@ -124,13 +127,14 @@ class Orthographic(Camera):
         origin, direction = self.views(x, y)
         return origin + self.near * direction, direction, 0.0, self.extent
 
-    def towards(self, points_w: F64) -> F64:
+    def towards(self, points_w: Any) -> F64:
         """Return the directions, (N, 3) float64, in which points (N, 3) are seen."""
-        return np.broadcast_to(np.array(self.forward), points_w.shape)
+        p = _check.array("points_w", points_w, ("N", 3), np.float64)
+        return np.broadcast_to(np.array(self.forward), p.shape)
 
     def receding(self, length: float) -> tuple[float, float]:
         """Return what `Camera.receding` says: depth falls by as much everywhere."""
-        return 0.0, length / self.extent
+        return 0.0, _check.real("length", length, above=0.0) / self.extent
 
     @property
     def stride_unit(self) -> float:
@@ -140,7 +144,7 @@ class Orthographic(Camera):
     def resized(self, width: int, height: int) -> Self:
         """Return the same view with another number of pixels; what the height shows stays."""
         x, y = self.shift_px
-        finer = _check.integer("height", height, least=1) / self.height
+        finer = _check.integer("height", height, least=1, most=LARGEST_SIDE) / self.height
         shift = (x * finer, y * finer)
         return replace(self, width=width, height=height, shift_px=shift)
 

@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 
 from hybrid_rt import _check
-from hybrid_rt.camera.camera import Camera
+from hybrid_rt.camera.camera import LARGEST_SIDE, Camera
 from hybrid_rt.camera.parts import checked_lens
 from hybrid_rt.errors import ArgumentError
 from hybrid_rt.kernels.arrays import F64, ViewArrays
@@ -122,33 +122,36 @@ class Pinhole(Camera):
 
     def z_view(self, depth: Any) -> F64:
         """Return distances from the eye along `forward`, float64, of depths, array_like."""
-        with np.errstate(divide="ignore"):
-            return np.asarray(self.near / np.asarray(depth, np.float64))
+        with np.errstate(all="ignore"):
+            return np.asarray(self.near / _check.reals("depth", depth))
 
     def depth_at(self, z_view: Any) -> F64:
         """Return depths, float64, of distances from the eye along `forward`, array_like."""
-        with np.errstate(divide="ignore"):
-            return np.asarray(self.near / np.asarray(z_view, np.float64))
+        with np.errstate(all="ignore"):
+            return np.asarray(self.near / _check.reals("z_view", z_view))
 
     def views(self, x: Any, y: Any) -> tuple[F64, F64]:
         """Return the lines of sight through places of the screen; see `Camera.views`."""
         x_v, y_v = self._across(x, y)
-        direction = np.asarray(
-            np.array(self.forward) + x_v * np.array(self.right) + y_v * np.array(self.up)
-        )
+        with np.errstate(all="ignore"):
+            direction = np.asarray(
+                np.array(self.forward) + x_v * np.array(self.right) + y_v * np.array(self.up)
+            )
         return np.broadcast_to(np.array(self.eye), direction.shape), direction
 
     def primary(self, x: Any, y: Any) -> tuple[F64, F64, float, float]:
         """Return rays through places of the screen, from the eye: t is z_view."""
         return *self.views(x, y), self.near, math.inf
 
-    def towards(self, points_w: F64) -> F64:
+    def towards(self, points_w: Any) -> F64:
         """Return the directions, (N, 3) float64, in which points (N, 3) are seen."""
-        return np.asarray(points_w - np.array(self.eye))
+        p = _check.array("points_w", points_w, ("N", 3), np.float64)
+        with np.errstate(all="ignore"):
+            return np.asarray(p - np.array(self.eye))
 
     def receding(self, length: float) -> tuple[float, float]:
         """Return what `Camera.receding` says: near / (z_view + length) of depths near / z_view."""
-        return length / self.near, 0.0
+        return _check.real("length", length, above=0.0) / self.near, 0.0
 
     @property
     def stride_unit(self) -> float:
@@ -158,7 +161,7 @@ class Pinhole(Camera):
     def resized(self, width: int, height: int) -> Self:
         """Return the same view with another number of pixels; the vertical field of view stays."""
         x, y = self.shift_px
-        finer = _check.integer("height", height, least=1) / self.height
+        finer = _check.integer("height", height, least=1, most=LARGEST_SIDE) / self.height
         shift = (x * finer, y * finer)
         return replace(self, width=width, height=height, shift_px=shift)
 

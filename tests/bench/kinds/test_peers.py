@@ -544,10 +544,17 @@ def test_a_real_peer_agrees_with_ours(name, cornell):
             assert row["depth_p99"] < 1e-5
             assert row["read_ms"] > 0
             other = dataclasses.replace(camera, width=80, height=40)  # after the first
-            drawing = opened.draw(other)
-            drawing.draw()
-            ours = hrt.rasterize(scene, other)
-            assert agreement.of_pictures(drawing.read(), ours)["same"] > 0.998
+            shifted = dataclasses.replace(camera, aspect=0.6, shift_px=(9.5, -4.0))
+            middle = scene.bounds.mean(axis=0)
+            flat = hrt.Camera.orthographic(
+                camera.eye, middle, view_height=3.0, width=64, height=48, near=0.5, far=9.0
+            )
+            for view in (other, shifted, flat):
+                drawing = opened.draw(view)
+                drawing.draw()
+                found = agreement.of_pictures(drawing.read(), hrt.rasterize(scene, view))
+                assert found["same"] > 0.998
+                assert found["depth_p99"] < 1e-5
             return
         for workload in ("mirror", "primary"):
             row = row_of(record, name, workload)

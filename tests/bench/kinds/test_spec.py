@@ -38,6 +38,12 @@ def test_the_paper_is_measured_at_its_own_resolutions_and_scenes():
     assert sizes == ["1280x720", "1920x1080", "2560x1440", "3840x2160"]
     assert [scene.row for scene in experiment.scenes] == ["Sphere", "Sponza", "Bistro"]
     assert experiment.row_of("sponza") == "Sponza"
+    quick = load_experiment("paper", quick=True)  # of built-in scenes
+    assert [quick.row_of(name) for name in ("sponza", "bistro", "sphere")] == [
+        "Sponza",
+        "Bistro",
+        "",
+    ]
     assert experiment.row_of("atrium") == ""  # which stands in for Sponza, and is not the paper's
     assert experiment.row_of("kitchen") == ""
 

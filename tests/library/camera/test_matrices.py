@@ -62,6 +62,7 @@ def perspective(kind, near=NEAR, far=FAR):
         "opengl": [-(far + near) / (far - near), -2 * far * near / (far - near), -1],
         "opengl reversed": [(far + near) / (far - near), 2 * far * near / (far - near), -1],
         "opengl infinite": [-1, -2 * near, -1],
+        "opengl infinite reversed": [1, 2 * near, -1],
         "opengl infinite, moved by rounding": [-1 + 2.0**-22, -2 * near, -1],
         "d3d": [far / (near - far), near * far / (near - far), -1],
         "d3d reversed": [near / (far - near), near * far / (far - near), -1],
@@ -75,8 +76,9 @@ def perspective(kind, near=NEAR, far=FAR):
 
 
 KINDS = [
-    "opengl", "opengl reversed", "opengl infinite", "opengl infinite, moved by rounding", "d3d",
-    "d3d reversed", "d3d infinite", "d3d infinite reversed",
+    "opengl", "opengl reversed", "opengl infinite", "opengl infinite reversed",
+    "opengl infinite, moved by rounding", "d3d", "d3d reversed", "d3d infinite",
+    "d3d infinite reversed",
 ]  # fmt: skip
 
 
@@ -102,6 +104,33 @@ def test_a_look_at_camera_comes_back_from_its_matrices(kind):
         np.testing.assert_allclose(camera.far, FAR, rtol=1e-12)
     for name in ("eye", "right", "up", "forward", "vfov_deg", "shift_px"):
         np.testing.assert_allclose(getattr(camera, name), getattr(SEEN, name), atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if "moved" not in kind])
+@given(
+    st.tuples(*[st.floats(-50, 50)] * 3), st.tuples(*[st.floats(-1, 1)] * 3),
+    st.floats(5, 150), st.floats(1e-3, 1), st.floats(2, 1e4), st.floats(-0.9, 0.9),
+)  # fmt: skip
+def test_any_look_at_camera_comes_back_from_its_matrices(kind, eye, way, degrees, near, far, turn):
+    target = np.add(np.add(eye, way), np.array((0, 0, -1.5)))
+    up = (turn, 1, 0)
+    seen = hrt.Camera.look_at(eye, target, up, vfov_deg=degrees, near=near, **SIZE)
+    projection = perspective(kind, near, far)
+    f = 1 / math.tan(math.radians(degrees) / 2)
+    projection[0, 0], projection[1, 1] = f * SIZE["height"] / SIZE["width"], f
+    convention = kind.split()[0]
+    view = look_at(np.array(eye), target, up)
+    camera = hrt.Camera.from_matrices(view, projection, convention=convention, **SIZE)
+    for name in ("eye", "right", "up", "forward"):
+        np.testing.assert_allclose(getattr(camera, name), getattr(seen, name), atol=1e-12)
+    np.testing.assert_allclose(camera.vfov_deg, degrees, rtol=1e-12)
+    # A finite far plane is one digit of the sum that it stands in: far / near digits are lost.
+    slack = 1e-15 * far / near + 1e-14
+    np.testing.assert_allclose(camera.near, near, rtol=slack)
+    if "infinite" in kind:
+        assert camera.far == math.inf
+    else:
+        np.testing.assert_allclose(camera.far, far, rtol=10 * slack)
 
 
 def test_matrices_in_float32_are_taken():

@@ -30,6 +30,13 @@ def camera():
 
 
 @functools.cache
+def flat():
+    return hrt.Camera.orthographic(
+        (0, 0, 6), (0.1, 0, 0), view_height=5, width=12, height=9, near=0.05, far=15
+    )
+
+
+@functools.cache
 def gbuffer():
     return hrt.rasterize(scene(), camera())
 
@@ -81,7 +88,8 @@ def judged():
 
 INSTANCES = {
     "Scene": scene,
-    "Camera": camera,
+    "Pinhole": camera,
+    "Orthographic": flat,
     "GBuffer": gbuffer,
     "Rays": rays,
     "Screen": screen,
@@ -143,6 +151,17 @@ VALUES = {
     "direction": lambda: rays().direction,
     "points_w": _vertices,
     "points_px": lambda: np.array([[1.5, 2.5, 0.25], [0.5, 0.5, 0.5]]),
+    "x": lambda: np.array([1.5, 2.5]),
+    "y": lambda: np.array([0.5, 7.0]),
+    "depth": lambda: np.array([0.25, 1.0]),
+    "z_view": lambda: np.array([0.5, 3.0]),
+    "length": lambda: 0.5,
+    "view_height": lambda: 5.0,
+    "far": lambda: 15.0,
+    "view": lambda: np.eye(4),
+    "projection": lambda: np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, -1, -0.1], [0, 0, -1, 0]]),
+    "K": lambda: np.array([[9, 0, 6], [0, 9, 4], [0, 0, 1]]),
+    "R": lambda: np.diag([1, -1, -1]),
     "width": lambda: 12,
     "height": lambda: 9,
     "factor": lambda: 1.5,
@@ -194,6 +213,7 @@ SPECIAL = {
     ("TRACERS.__getitem__", "name"): lambda: "brute",
     ("TRACERS.check", "thing"): lambda: hrt.BruteForceTracer,
     ("TRACERS.register", "thing"): lambda: hrt.BruteForceTracer,
+    **{(f"{kind}.from_intrinsics", "t"): lambda: (0, 0, 6) for kind in ("Pinhole", "Orthographic")},
     ("Point", "technique"): hrt.Paper,
     ("Screen.of", "technique"): hrt.Certified,
     ("Rays.take", "index"): lambda: np.arange(3),

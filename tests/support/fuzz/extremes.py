@@ -1,5 +1,6 @@
 """Scenes, views and rays that are allowed and that nobody has: huge, tiny, flat, in one point."""
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -34,15 +35,22 @@ def camera(rng: np.random.Generator, seen: hrt.Scene) -> hrt.Camera:
         target = seen.bounds.mean(axis=0)
         eye = target + seen.diagonal * rng.uniform(-2, 2, 3)
         near = float(rng.choice([1e-9, 1e-3, 0.3]) * (seen.diagonal or 1.0))
-    return hrt.Camera.look_at(
-        eye,
-        target,
-        up=(0.1, 1, 0.2),
-        vfov_deg=float(rng.choice([1e-3, 1.0, 60.0, 170.0, 179.99])),
-        width=width,
-        height=height,
-        near=near,
-    )
+    size = {"width": width, "height": height}
+    lens = {"aspect": 1.0, "shift_px": (0.0, 0.0)}
+    if rng.random() < 0.5:
+        lens["aspect"] = float(rng.choice([1e-6, 0.5, 1.0, 30.0]))
+        lens["shift_px"] = tuple(rng.choice([-1e9, -300.5, 0.0, 7.0, 1e5], 2).tolist())
+    if rng.random() < 0.4:
+        deep = float(rng.choice([1e-3, 1.0, 5.0, 1e12]) * (seen.diagonal or 1.0))
+        near = float(rng.choice([0.0, -1.0, 0.5]) * deep)
+        shown = float(rng.choice([1e-6, 0.3, 1.0, 1e6]) * (seen.diagonal or 1.0))
+        view = hrt.Camera.orthographic(
+            eye, target, (0.1, 1, 0.2), view_height=shown, near=near, far=near + deep, **size
+        )
+        return dataclasses.replace(view, **lens)
+    degrees = float(rng.choice([1e-3, 1.0, 60.0, 170.0, 179.99]))
+    view = hrt.Camera.look_at(eye, target, (0.1, 1, 0.2), vfov_deg=degrees, near=near, **size)
+    return dataclasses.replace(view, **lens)
 
 
 def rays(rng: np.random.Generator, n: int = 40) -> hrt.Rays:

@@ -71,7 +71,8 @@ def _rate(rate: hrt.Rate) -> None:
 
 USES: dict[str, Callable[[Any], None]] = {
     "Scene": _scene,
-    "Camera": _camera,
+    "Pinhole": _camera,
+    "Orthographic": _camera,
     "GBuffer": _gbuffer,
     "Rays": _rays,
     "Screen": _screen,

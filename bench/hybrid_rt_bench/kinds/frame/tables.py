@@ -8,7 +8,7 @@ import pandas as pd
 
 from hybrid_rt.judging.rate import Rate
 from hybrid_rt_bench.kinds.frame.columns import WRONG
-from hybrid_rt_bench.report.table import ABSENT, Table, number, rate_text
+from hybrid_rt_bench.report.table import DASH, Table, number, rate_text
 from hybrid_rt_bench.results.folder import RunData
 
 
@@ -42,7 +42,7 @@ def answers(run: RunData, workload: str) -> Table:
             ]
         table.rows.append(cells)
     table.notes += [
-        f"{int(rows.rays.iloc[0]):,} rays. Alpha: the share of rays that the screen resolves.",
+        f"{int(rows.rays.iloc[0]):,} rays. Alpha: the share of rays that the screen answers.",
         _frame_words(run.meta["frame"]),
     ]
     if judged:
@@ -73,7 +73,7 @@ def ended(run: RunData) -> Table:
 
 
 def _share(row: pd.Series[Any], name: str) -> str:
-    return number(float(row[name])) if name in row else ABSENT
+    return number(float(row[name])) if name in row else DASH
 
 
 def _frame_words(frame: dict[str, Any]) -> str:
