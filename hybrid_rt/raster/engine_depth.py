@@ -73,7 +73,7 @@ class Form:
         """Return the numbers of a buffer, integers from 0 to 1, and half the step at each."""
         if self.bits is None:
             values = depth.astype(np.float64)
-            with np.errstate(invalid="ignore"):
+            with np.errstate(invalid="ignore", over="ignore"):
                 return values, 0.5 * np.spacing(np.abs(depth)).astype(np.float64)
         steps = 2**self.bits - 1
         return depth / np.float64(steps), np.full(depth.shape, 0.5 / steps)
@@ -195,10 +195,12 @@ def _background(background: Any, depth: NDArray[Any]) -> Bool:
     if isinstance(background, float | np.floating) and not np.isfinite(background):
         return np.asarray(np.isnan(depth) if np.isnan(background) else depth == background)
     try:
-        return np.asarray(depth == _check.real("background", background))
+        value = _check.real("background", background)
     except ArgumentError as error:
         expected = "None, a number, or an array of bool like depth"
         raise ArgumentError("background", expected, error.got) from None
+    with np.errstate(over="ignore"):  # one that the array's dtype cannot hold is nowhere in it
+        return np.asarray(depth == value)
 
 
 def _in_range(

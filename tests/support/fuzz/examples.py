@@ -7,16 +7,23 @@ value here is a gap in the table: `arguments` says so by raising `NoExampleError
 import dataclasses
 import functools
 import inspect
+import tempfile
 from typing import Any
 
 import numpy as np
 
 import hybrid_rt as hrt
+import hybrid_rt_scenes as hrs
 from support import soup
 
 
 class NoExampleError(Exception):
     """The table has no value for a required parameter."""
+
+
+@functools.cache
+def scratch():
+    return tempfile.TemporaryDirectory()
 
 
 @functools.cache
@@ -222,9 +229,9 @@ SPECIAL = {
     ("Hits.checked", "faces"): lambda: len(scene()),
     ("Marched.checked", "n"): lambda: len(rays()),
     ("Marched.checked", "faces"): lambda: len(scene()),
-    ("save_cameras", "path"): lambda: "nowhere/views.toml",
+    ("save_cameras", "path"): lambda: f"{scratch().name}/views.toml",
     ("save_cameras", "cameras"): lambda: {"a": camera()},
-    ("load_cameras", "path"): lambda: "nowhere.toml",
+    ("load_cameras", "path"): lambda: hrs.registry.DEFINITIONS / "sphere.toml",
     ("GBuffer.from_arrays", "depth"): lambda: 1.0 - gbuffer().depth,
     ("GBuffer.from_arrays", "kind"): lambda: "standard",
     ("GBuffer.from_arrays", "origin"): lambda: "top",
