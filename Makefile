@@ -21,6 +21,7 @@ help:
 	@echo "make reference-runs  measure what stands behind docs/results: 45 minutes on a quiet machine"
 	@echo "make results    render docs/results and the findings in README from the runs committed there"
 	@echo "make cold-start  seconds that the first picture waits for compilation"
+	@echo "make compare-aa  runs of one program and of a slower one: what \`hybrid-rt compare\` says"
 	@echo "make clean      remove .venv and caches"
 
 $(STAMP): pyproject.toml
@@ -77,3 +78,7 @@ clean:
 .PHONY: cold-start
 cold-start: $(STAMP)
 	$(BIN)/python bench/cold_start.py
+
+.PHONY: compare-aa
+compare-aa: $(STAMP)
+	$(BIN)/python bench/compare_aa.py

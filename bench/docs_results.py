@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 
 from hybrid_rt.judging.rate import Rate
+from hybrid_rt_bench.report.scenes import scene_name
 from hybrid_rt_bench.results.folder import RunData
 from hybrid_rt_bench.runs import read_run, render_run
 from reference_runs import RESULTS, ROOT, RUNS
@@ -34,7 +35,7 @@ def committed(results: Path = RESULTS) -> dict[str, RunData]:
 def findings(runs: dict[str, RunData], docs: str) -> str:
     """Return the three findings in Markdown; `docs` is the way to the folder docs."""
     wrong, certain, pays = (
-        make(runs[name].results) if name in runs else ""
+        make(_named(runs[name])) if name in runs else ""
         for make, name in ((_wrong, "error"), (_certain, "error"), (_pays, "hybrid"))
     )
     return "\n".join(
@@ -102,6 +103,11 @@ def _made(run: RunData) -> str:
     commit = str(machine.get("git") or "unknown")[:12]
     day = str(run.meta["started"])[:10]
     return f"{day}, {machine['cpu']}, {machine['threads']} threads, commit {commit}, {cells} cells"
+
+
+def _named(run: RunData) -> pd.DataFrame:
+    """Return the results of a run, its scenes called as its tables call them."""
+    return run.results.assign(scene=[scene_name(run, str(name)) for name in run.results.scene])
 
 
 def _wrong(results: pd.DataFrame) -> str:

@@ -11,11 +11,7 @@ import pytest
 from hybrid_rt_bench import cli
 from support import ROOT
 
-PAGES = sorted(
-    path
-    for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/*.md"))
-    if "runs" not in path.parts
-)
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/*.md")])
 NAMES = [path.relative_to(ROOT).as_posix() for path in PAGES]
 
 

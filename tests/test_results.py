@@ -16,7 +16,7 @@ from hybrid_rt_bench.measure.experiment import Resolution
 from hybrid_rt_bench.registry import kinds
 from hybrid_rt_bench.runs import read_run, render_run
 from hybrid_rt_scenes import get_scene
-from support import PYTHONPATH
+from support import PYTHONPATH, ROOT
 
 COMMITTED = docs_results.committed()
 SMALL = 500_000
@@ -75,6 +75,15 @@ def test_findings_are_the_sums_of_the_rows(tiny):
     default = hybrid[(hybrid.technique == "certified") & hybrid.default].speedup
     mean = default.prod() ** (1 / len(default))
     assert f"sphere {mean:.2f} by default" in said
+
+
+@pytest.mark.slow
+def test_the_folder_of_a_run_is_read_as_the_guide_says(tiny, capsys):
+    guide = (ROOT / "docs" / "howto.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```py\n(.*?)```", guide, flags=re.DOTALL)
+    (path,) = re.findall(r'^folder = "(.*)"$', block, flags=re.MULTILINE)
+    exec(compile(block.replace(path, str(tiny["error"].folder)), "howto.md", "exec"), {})
+    assert re.search(r"^sphere +0\.\d+$", capsys.readouterr().out, flags=re.MULTILINE)
 
 
 @pytest.mark.slow

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from hybrid_rt_bench.measure.experiment import AnyExperiment
     from hybrid_rt_bench.measure.lifecycle import Outcome
     from hybrid_rt_bench.report.table import Table
+    from hybrid_rt_bench.results.compared import Compared
     from hybrid_rt_bench.results.folder import RunData
     from hybrid_rt_bench.results.schema import Schema
 
@@ -56,8 +57,8 @@ class Kind:
     figures : sequence of callable
         Each writes pictures of a run into a folder and returns their paths.
     options : sequence of Option
-    compare : callable, optional
-        Returns the tables of how two of its runs differ; None for a kind without times.
+    compare : Compared, optional
+        Which of its columns are counted, timed and the baseline, so that its runs can be compared.
     listing : callable, optional
         Returns tables for ``hybrid-rt list``.
     frames : str
@@ -107,9 +108,9 @@ class Kind:
         """Return what makes the figures."""
         return [self._found(figure) for figure in self.figures]
 
-    def comparer(self) -> Callable[[RunData, RunData], list[Table]] | None:
-        """Return what compares two runs."""
-        found: Callable[[RunData, RunData], list[Table]] | None = self._found(self.compare)
+    def compared(self) -> Compared | None:
+        """Return what of its results is compared between runs."""
+        found: Compared | None = self._found(self.compare)
         return found
 
     def listed(self) -> list[Table]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -10,8 +10,10 @@ from hybrid_rt.errors import ArgumentError, HybridRTError
 from hybrid_rt_bench.measure.errors import reason_of
 from hybrid_rt_bench.registry import kinds
 from hybrid_rt_bench.report import render
+from hybrid_rt_bench.report.comparison.compare import Comparison, compare
 from hybrid_rt_bench.report.table import Table
 from hybrid_rt_bench.report.verdict import paragraph
+from hybrid_rt_bench.results.effects import SMALLEST
 from hybrid_rt_bench.results.files import ReportsError
 from hybrid_rt_bench.results.folder import RunData, load_run
 
@@ -59,23 +61,45 @@ def verdict_of(run: RunData) -> str:
     return _whole(run, lambda: paragraph(run, kinds[run.kind].verdict_maker()))
 
 
-def compare_runs(a: RunData, b: RunData) -> list[Table]:
-    """Return the tables of how run `b` differs from run `a`.
+def compare_runs(
+    before: Sequence[RunData], after: Sequence[RunData], smallest: float = SMALLEST
+) -> Comparison:
+    """Return how the runs of one side differ from those of the other.
+
+    Parameters
+    ----------
+    before, after : sequence of RunData
+        Several runs a side say how far runs of one program lie apart.
+    smallest : float
+        As a share: no smaller change is reported.
 
     Raises
     ------
     ArgumentError
-        Runs of different kinds, of one that has no times, or without a cell in common.
+        No run, one run twice on a side, runs of different kinds, of a kind that does not say what
+        of it is compared, or without a row in common.
     ReportsError
         What a folder holds cannot be compared.
     """
-    comparer = kinds[a.kind].comparer()
-    if comparer is None or a.kind != b.kind:
-        able = [f"two of kind {name!r}" for name, kind in kinds.items() if kind.compare is not None]
-        other = a if comparer is None else b
-        raise ArgumentError("runs", " or ".join(able), f"{other.name}, of kind {other.kind!r}")
-    made = comparer
-    return _whole(a, lambda: made(a, b))
+    for side, runs in (("before", before), ("after", after)):
+        if not runs:
+            raise ArgumentError(side, "at least one run", "none")
+        folders = [run.folder.resolve() for run in runs]
+        for run in runs:
+            if folders.count(run.folder.resolve()) > 1:
+                raise ArgumentError(side, "runs that differ", f"{run.name} twice")
+    if not 0 <= smallest < 10:
+        raise ArgumentError("smallest", "a share, 0 or more", str(smallest))
+    kind = before[0].kind
+    for run in (*before, *after):
+        if run.kind != kind:
+            expected = f"runs of one kind ({before[0].name} is of kind {kind!r})"
+            raise ArgumentError("runs", expected, f"{run.name}, of kind {run.kind!r}")
+    compared = kinds[kind].compared()
+    if compared is None:
+        raise ArgumentError("runs", "a kind that says what of it is compared", repr(kind))
+    known, schema = compared, kinds[kind].columns()
+    return _whole(before[0], lambda: compare(before, after, known, schema, smallest))
 
 
 def _whole(run: RunData, call: Callable[[], Made]) -> Made:

@@ -62,7 +62,7 @@ def draw(axes, gbuffer, lists, rays, marched, i, reference):
         said = "what is not listed may be in the way from the dotted line on"
         where = along[np.argmin(np.hypot(px + 0.5 - stop[0], py + 0.5 - stop[1]))]
         axes.axvline(where, color="black", ls=":", lw=1.4, label="where it is handed over")
-    title(axes, f"Pixel ({own[0]}, {own[1]}): {said}", 4.2)
+    title(axes, f"Pixel ({own[0]}, {own[1]}): {said}", 4.45)
     axes.set_xlim(0, along[-1])
     axes.set_ylim(0, 1.1 * max(depth.max(), hit[2]))
     axes.set_xlabel("along the ray on the screen, pixels")

@@ -9,6 +9,7 @@ from hybrid_rt.kernels.arrays import F64, Bool
 SPANS = (8, 4, 2, 1)
 """Pixels to one side that a line may run through."""
 MARGIN = max(SPANS)
+ROWS = 16
 STEP = 0.5
 """A difference is a step between two surfaces if the next one is so much smaller."""
 
@@ -50,6 +51,15 @@ def differences(depth: F64, slack: F64) -> tuple[F64, F64]:
 
 
 def _along_rows(depth: F64, slack: F64) -> F64:
+    """Return the slopes along rows, some rows at a time, which a cache holds."""
+    slopes = np.empty_like(depth)
+    for first in range(0, len(depth), ROWS):
+        rows = slice(first, first + ROWS)
+        slopes[rows] = _of_rows(depth[rows], slack[rows])
+    return slopes
+
+
+def _of_rows(depth: F64, slack: F64) -> F64:
     line = _Line(depth, slack)
     slope = line.nearest()
     open_ = depth > 0.0

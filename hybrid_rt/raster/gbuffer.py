@@ -214,19 +214,21 @@ class GBuffer(Record):
         how = engine_depth.form(camera, depth, kind, bits, far, origin)
         seen = engine_depth.read(camera, depth, how, background)
         covered = seen.depth > 0.0
-        ddx, ddy = derivatives.differences(seen.depth, seen.uncertainty)
         if scene is None:
             prim_id = np.where(covered, 0, -1).astype(np.int32)
+            ddx, ddy = derivatives.differences(seen.depth, seen.uncertainty)
             images = _stored(seen.depth, covered), _float32(ddx), _float32(ddy)
             return cls(*images, prim_id, None, camera, {}, _float32(seen.uncertainty))
         found = matching.match(scene, camera, seen, tracer)
-        stored, ddx, ddy, off = (
-            np.where(found.found, exact, rough)
-            for exact, rough in (
-                (found.depth, seen.depth), (found.ddx, ddx), (found.ddy, ddy),
-                (0.0, seen.uncertainty),
+        stored, ddx, ddy, off = found.depth, found.ddx, found.ddy, np.zeros_like(seen.depth)
+        if not found.found[covered].all():
+            rough = derivatives.differences(seen.depth, seen.uncertainty)
+            stored, ddx, ddy, off = (
+                np.where(found.found, exact, other)
+                for exact, other in zip(
+                    (stored, ddx, ddy, off), (seen.depth, *rough, seen.uncertainty), strict=True
+                )
             )
-        )  # fmt: skip
         share = 1.0 - found.agrees.mean()
         if share > SAID:
             text = f"the depth buffer and scene {scene.name!r} disagree in {100 * share:.1f} % of"

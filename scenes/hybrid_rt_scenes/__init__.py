@@ -6,6 +6,7 @@ from hybrid_rt_scenes.importing import ImportedScene, import_scene
 from hybrid_rt_scenes.places import data_directories, data_directory
 from hybrid_rt_scenes.registry import (
     SCENES,
+    all_scenes,
     get_scene,
     read_definition,
     register,
@@ -30,6 +31,7 @@ __all__ = [
     "MeshSpec",
     "MissingDataError",
     "SceneSpec",
+    "all_scenes",
     "automatic_cameras",
     "automatic_lights",
     "data_directories",

@@ -79,6 +79,20 @@ def get_scene(name: str) -> SceneSpec:
     return SCENES[name]
 
 
+def all_scenes() -> tuple[list[SceneSpec], list[str]]:
+    """Return all scenes, and a sentence about each name of which there is none to be had.
+
+    That is a definition in a data directory that was damaged, or a plug-in that cannot be loaded.
+    """
+    specs, faults = [], []
+    for name in scene_names():
+        try:
+            specs.append(get_scene(name))
+        except hrt.HybridRTError as error:
+            faults.append(f"scene {name!r} cannot be used: {error}")
+    return specs, faults
+
+
 def read_definition(path: Path) -> SceneSpec:
     """Return the scene that a TOML file defines; it is named after the file.
 

@@ -67,6 +67,8 @@ LAYOUTS = {
 }
 
 ENTRIES = {"builtin": True, "row": "Sponza"}
+PARTIAL = {"mark": "partial", "note": "a tenth of its triangles are absent"}
+"""Of the scene with the long name."""
 MACHINE = {**ENVIRONMENT, "cpu": "Intel(R) Xeon(R) Platinum 8481C CPU @ 2.70GHz"}
 
 
@@ -74,7 +76,10 @@ def _writer(out, kind, schema, layout, **meta):
     about = {
         "kind": kind, "command": [], "notes": [], "warnings": [], "environment": MACHINE,
         "spec": {"title": "Made up", "rounds": 3, "repeats": 2},
-        "scenes": [{"name": s, "triangles": 10**k, **ENTRIES} for k, s in enumerate(layout.scenes)],
+        "scenes": [
+            {"name": s, "triangles": 10**k, **ENTRIES, **(PARTIAL if s == LONG else {})}
+            for k, s in enumerate(layout.scenes)
+        ],
         **meta,
     }  # fmt: skip
     writer = results.create_run(out, kind, schema, about)

@@ -22,13 +22,13 @@ is traced with Embree. This program measures what that saves against tracing eve
 strongest Embree, and what it gets wrong.
 
 Begin with `hybrid-rt run paper --quick`, then `hybrid-rt list`.""",
-    epilog="""Exit codes: 0 all well, 2 wrong usage, 3 some cells failed, nothing could be run, a
-promise is broken or a file cannot be written or read, 130 stopped by Ctrl-C. What was finished is
-always kept.""",
+    epilog="""Exit codes: 0 all well, 1 something changed (`compare --fail-on-change`), 2 wrong
+usage, 3 some cells failed, nothing could be run, a promise is broken or a file cannot be written or
+read, 130 stopped by Ctrl-C. What was finished is always kept.""",
 )
 run.add_to(app)
 app.command()(report.report)
-app.command()(compare.compare)
+app.command(cls=compare.ManyRuns)(compare.compare)
 app.command("list")(listing.list_all)
 app.command("import")(importing.import_mesh)
 app.command()(info.info)

@@ -118,6 +118,11 @@ def _cameras(made: ImportedScene) -> list[str]:
         )
     elif empty:
         lines.append(f"note: {', '.join(empty)} show next to nothing")
+    if made.known and made.spec.mark:
+        lines.append(
+            f"note: reports will call this scene {made.spec.mark}: {made.spec.note}. If that is "
+            "not so of this file, give it another --name."
+        )
     return lines
 
 

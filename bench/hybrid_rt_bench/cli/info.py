@@ -35,7 +35,6 @@ def info(
 
     import hybrid_rt_scenes as hrs
     from hybrid_rt_bench.measure import environment as env
-    from hybrid_rt_scenes import data_directories
 
     out = terminal.out()
     load = env.load_average()
@@ -47,16 +46,18 @@ def info(
         elif key == "memory_bytes":
             key, value = "memory", f"{value / 2**30:.1f} GiB"
         table.add_row(key.replace("_", " "), str(value))
-    specs = [hrs.get_scene(name) for name in hrs.scene_names()]
+    specs, faults = hrs.all_scenes()
     there = [spec for spec in specs if spec.missing() is None]
     named = (f"{spec.name} ({spec.mark})" if spec.mark else spec.name for spec in there)
     table.add_row("scenes", ", ".join(named))
-    table.add_row("scenes looked for in", "\n".join(map(str, data_directories())))
+    table.add_row("scenes looked for in", "\n".join(map(str, hrs.data_directories())))
     out.print(table)
     for spec in there:
         if spec.mark:
-            out.print(f"{spec.name}, {spec.mark}: {spec.note}.", soft_wrap=True, highlight=False)
-    problems = env.problems(found)
+            out.print(
+                f"Scene {spec.name} ({spec.mark}): {spec.note}.", soft_wrap=True, highlight=False
+            )
+    problems = [*env.problems(found), *faults]
     if not problems:
         out.print("no problems found", style="green")
     for problem in problems:

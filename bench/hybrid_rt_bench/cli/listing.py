@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from rich.table import Table
 from rich.text import Text
 
-from hybrid_rt.errors import HybridRTError
 from hybrid_rt_bench.cli import terminal
 from hybrid_rt_bench.cli.common import show_table
 
@@ -41,19 +40,15 @@ def _scenes() -> None:
     import hybrid_rt_scenes as hrs
 
     out = terminal.out()
-    missing, rows = [], []
-    for name in hrs.scene_names():
-        try:
-            spec = hrs.get_scene(name)
-        except HybridRTError as error:  # a definition in the data directory that was damaged
-            missing.append(f"scene {name!r} cannot be used: {error}")
-            continue
+    rows = []
+    specs, missing = hrs.all_scenes()
+    for spec in specs:
         absent = spec.missing()
         state = "built in" if spec.builtin else "missing" if absent else "found"
         if absent:
             missing.append(absent)
         mark = f", {spec.mark}" if spec.mark else ""
-        named = Text.assemble(name, "\n", (state + mark, "dim"))
+        named = Text.assemble(spec.name, "\n", (state + mark, "dim"))
         note = f"\n{spec.mark}: {spec.note}" if spec.mark else ""
         rows.append((named, "\n".join(spec.cameras), spec.description + note))
     _table("Scenes", ("scene", "cameras", "what it is"), rows)

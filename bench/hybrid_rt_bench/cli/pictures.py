@@ -69,14 +69,26 @@ def render(scene: hrt.Scene, camera: hrt.Camera, what: What, threads: int | None
     -------
     (H, W, 3) uint8
     """
-    gbuffer = hrt.rasterize(scene, camera, threads=threads)
-    kinds = ("shaded", "depth", "normals", "status") if what == "all" else (what,)
+    return of_view(hrt.rasterize(scene, camera, threads=threads), what, threads)
+
+
+def of_view(gbuffer: hrt.GBuffer, what: What, threads: int | None = None) -> U8:
+    """Return a picture of a G-buffer, as `render`.
+
+    Raises
+    ------
+    ArgumentError
+        "shaded" of one whose scene is not known; of such "all" are the others.
+    """
+    scene = gbuffer.scene
+    every = ("depth", "normals", "status") if scene is None else PICTURES[:4]
+    kinds: tuple[str, ...] = every if what == "all" else (what,)
     rays = hrt.mirror_rays(gbuffer)
     made: dict[str, Picture] = {}
     entries: list[Entry] = []
     for kind in kinds:
         if kind == "shaded":
-            tracer = hrt.EmbreeTracer(scene, threads=threads, path=native_path())
+            tracer = hrt.EmbreeTracer(gbuffer.known_scene, threads=threads, path=native_path())
             made[kind] = Picture(shade.shaded(gbuffer, rays, tracer, samples=16))
         elif kind == "depth":
             made[kind] = Picture(*depth_picture(gbuffer))
@@ -95,7 +107,7 @@ def render(scene: hrt.Scene, camera: hrt.Camera, what: What, threads: int | None
         entries.append((STATUSES[""], "no surface"))
     title = ""
     if what == "all":
-        title = f"{scene.name}, {len(scene):,} triangles"
+        title = "a depth buffer" if scene is None else f"{scene.name}, {len(scene):,} triangles"
         made = {k: replace(p, image=reduced(p.image, SHEET)) for k, p in made.items()}
         entries.append((STATUSES[""], "no surface"))
     return pixels(sheet(list(made.values()), columns=2, title=title, legend=entries))

@@ -17,4 +17,5 @@ def judging(name: str, package: str, spec: str, frames: str = "") -> Kind:
         figures=("hybrid_rt_bench.judged.figures:plots", "hybrid_rt_bench.judged.maps:figures"),
         options=(*VIEWS, TECHNIQUES),
         frames=frames,
+        compare="hybrid_rt_bench.judged.compared:COMPARED",
     )

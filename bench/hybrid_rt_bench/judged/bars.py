@@ -62,8 +62,10 @@ def _bars(run: RunData, label: str, height: Height, even: float = 0.0) -> Figure
         figsize=(max(6.4, 1.4 + each * len(lines[0])), 1.3 + 2.7 * len(lines)),
     )
     axes = panels(figure, len(lines), 1, sharey=True)
-    finite = [value for heights in pooled.values() for value in heights if math.isfinite(value)]
-    top = 1.1 * max(0.1, 1.05 * even, *finite)
+    finite = [heights for heights in pooled.values() if math.isfinite(heights[0])]
+    # Of whiskers no more is shown than what leaves bars apart.
+    highest, whisker = (max([h[k] for h in finite] or [0.1]) for k in (0, 2))
+    top = 1.1 * max(0.1, 1.05 * even, min(whisker, 2 * max(highest, even)))
     width = 0.84 / len(look)
     for ax, names in zip(axes, lines, strict=True):
         for k, (technique, how) in enumerate(look.items()):
@@ -93,6 +95,7 @@ def _bars(run: RunData, label: str, height: Height, even: float = 0.0) -> Figure
         figure,
         "Default parameters; pooled over the cells that all techniques of a kind of rays have in "
         f"common. {'Whiskers: 95 % intervals. Above the line at 1 it pays. ' if even else ''}"
+        f"{'Whiskers that leave the panel go on beyond it. ' if whisker > top else ''}"
         f"{told(run, same)}",
     )
     return figure

@@ -23,6 +23,7 @@ from hybrid_rt_bench.judged.columns import CELL, EMBREE, POINT, WRONG
 from hybrid_rt_bench.judged.pooling import Pooled, pareto, pools
 from hybrid_rt_bench.report.alike import alike
 from hybrid_rt_bench.report.looks import GREY, looks
+from hybrid_rt_bench.report.scenes import scene_name
 from hybrid_rt_bench.report.style import footer, legend, ordered, panels, save_all, title, told
 from hybrid_rt_bench.results.folder import RunData
 
@@ -107,12 +108,12 @@ def speed_by_scene(run: RunData) -> Figure:
     for ax, (scene, some) in zip(axes, dots.items(), strict=True):
         _draw(ax, some, ordered(run.results["technique"]), break_even=True, small=True,
               scale_of=every)  # fmt: skip
-        title(ax, scene, 3.3, fontweight="bold")
+        title(ax, scene_name(run, scene), 3.3, fontweight="bold")
     figure.supylabel("measured speed-up over the strongest Embree", fontsize=11)
     for ax in axes[-columns:]:
         ax.set_xlabel("wrong answers, % of all rays")
     _explain(figure, axes, break_even=True)
-    footer(figure, "Whiskers: 95 % intervals.", told(run, rows), *_absent(run, rows, "scene"))
+    footer(figure, *_signs(every), told(run, rows), *_absent(run, rows, "scene"))
     return figure
 
 
@@ -136,7 +137,7 @@ def _finish(
     """Draw dots with the legend and the footer, then name those of default parameters."""
     _draw(ax, dots, ordered(run.results["technique"]), break_even=break_even)
     _explain(figure, [ax], break_even=break_even)
-    footer(figure, "Whiskers: 95 % intervals.", told(run, rows), *_absent(run, rows))
+    footer(figure, *_signs(dots), told(run, rows), *_absent(run, rows))
     _name(figure, ax, dots)
 
 
@@ -237,8 +238,24 @@ def _scale(ax: Axes, dots: Sequence[Dot], *, small: bool) -> None:
     ax.xaxis.set_minor_locator(NullLocator())
     ax.set_xticks(ticks, ["none\nseen", *(_decade(k) for k in decades)])
     ax.axvspan(-0.35 * threshold, 0.35 * threshold, color="#E9F3EC", zorder=0, lw=0)
-    top = max([dot.high for dot in dots] or [1.0])
-    ax.set_ylim(0, 1.14 * max(top, 1.0))
+    ax.set_ylim(0, 1.14 * _top(dots))
+
+
+def _top(dots: Sequence[Dot]) -> float:
+    """Return the height that is shown: of whiskers no more than what leaves dots apart."""
+    return max(1.0, min(max(dot.high for dot in dots), 2 * max(dot.worth for dot in dots)))
+
+
+def _signs(dots: Sequence[Dot]) -> list[str]:
+    """Return what the signs say, in sentences."""
+    words = [
+        "Whiskers: 95 % intervals.",
+        "Pareto front: no other point is both faster and less wrong. Pale: another point of the "
+        "same technique is.",
+    ]
+    if max(dot.high for dot in dots) > 1.14 * _top(dots):
+        words.append("Whiskers that leave the panel go on beyond it.")
+    return words
 
 
 def _name(figure: Figure, ax: Axes, dots: Sequence[Dot]) -> None:
@@ -275,11 +292,11 @@ def _explain(figure: Figure, axes: Iterable[Axes], *, break_even: bool) -> None:
     sign: dict[str, Any] = {"color": GREY, "ls": "", "marker": "o"}
     found |= {
         "ringed: default parameters": Line2D([], [], ms=9, mec="black", **sign),
-        "pale: another point of it beats it": Line2D([], [], ms=6, alpha=0.35, **sign),
-        "Pareto front: none is both faster and less wrong": Line2D([], [], color=FRONT, lw=5),
+        "pale: beaten": Line2D([], [], ms=6, alpha=0.35, **sign),
+        "Pareto front": Line2D([], [], color=FRONT, lw=5),
     }
     if break_even:
-        found["as fast as the strongest Embree"] = Line2D([], [], color="black", lw=1.1)
+        found["as fast as Embree"] = Line2D([], [], color="black", lw=1.1)
     legend(figure, list(found.values()), list(found), fontsize=9)
 
 

@@ -15,6 +15,7 @@ from hybrid_rt_bench.judged.pooling import Pooled
 from hybrid_rt_bench.judged.tables import defaults
 from hybrid_rt_bench.report import sheet
 from hybrid_rt_bench.report.looks import GREYS, MIDDLE, VERDICTS
+from hybrid_rt_bench.report.scenes import scene_name, scene_notes
 from hybrid_rt_bench.report.sheet import Picture
 from hybrid_rt_bench.report.style import save
 from hybrid_rt_bench.report.table import number, threads_text
@@ -24,6 +25,9 @@ U8 = NDArray[np.uint8]
 
 PANEL = 800
 """Width of a panel of a sheet in pixels, at most, and at least half of it."""
+
+ORDER = ("background", "right", "unresolved", "wrong_primitive", *reversed(WRONG))
+"""What the pixels of a map say, the worst last."""
 
 LEGEND = (
     (VERDICTS["false_hit"], "false hit"),
@@ -81,18 +85,23 @@ def sheet_of(run: RunData, cell: dict[str, Any], grey: U8, classes: dict[str, U8
             )
             for name, kinds in classes.items()
         ],
-        title=f"{cell['scene']}, camera {cell['camera']}, {cell['width']}×{cell['height']}: where "
+        title=f"{scene_name(run, cell['scene'])}, camera {cell['camera']}, "
+        f"{cell['width']}×{cell['height']}: where "
         "the answers to mirror rays are wrong",
         legend=LEGEND,
-        foot=f"Default parameters. {threads_text(machine['threads'])}; {machine['cpu']}.",
+        foot=" ".join(
+            (
+                f"Default parameters. {threads_text(machine['threads'])}; {machine['cpu']}.",
+                *scene_notes(run, [cell["scene"]]),
+            )
+        ),
     )
 
 
 def fitted(grey: U8, classes: U8) -> U8:
     """Return the map at a panel's size, by a whole factor; of several pixels the worst is kept."""
     smaller, larger = sheet.factors(grey.shape[1], PANEL)
-    order = ["background", "right", "unresolved", "wrong_primitive", *reversed(WRONG)]
-    kept = sheet.worst(classes, smaller, [MAP_CLASSES[name] for name in order])
+    kept = sheet.worst(classes, smaller, [MAP_CLASSES[name] for name in ORDER])
     return sheet.enlarged(error_map(sheet.mean(grey, smaller), kept), larger)
 
 

@@ -10,6 +10,7 @@ from hybrid_rt_bench.judged.columns import EMBREE, POINT, STRICT, WRONG
 from hybrid_rt_bench.judged.pooling import Pooled, pools
 from hybrid_rt_bench.judged.tables import common, defaults, timed
 from hybrid_rt_bench.judged.text import pays, plain, power
+from hybrid_rt_bench.report.scenes import scene_name
 from hybrid_rt_bench.report.table import interval, number, rate_words
 from hybrid_rt_bench.report.words import MOST_NAMED, counted, how_many, listed, named
 from hybrid_rt_bench.results import statistics as stats
@@ -34,9 +35,9 @@ def speedups(
     return {name: speedup for name, speedup in every.items() if speedup is not None}
 
 
-def where(rows: pd.DataFrame) -> str:
+def where(run: RunData, rows: pd.DataFrame) -> str:
     """Return in words which cells rows are of."""
-    scenes = named([str(s) for s in dict.fromkeys(rows["scene"])], "scene")
+    scenes = named([scene_name(run, str(s)) for s in dict.fromkeys(rows["scene"])], "scene")
     workloads = [plain(str(w)) for w in dict.fromkeys(rows["workload"])]
     rays = f"{listed(workloads)} rays" if len(workloads) <= MOST_NAMED else "many kinds of rays"
     keys = ["scene", "camera", "width", "height", "workload", "seed"]

@@ -16,15 +16,15 @@ def document(run: RunData, tables: list[Table], verdict: str) -> str:
     parts = [f"# {meta['spec']['title']}", paragraph(f"**Verdict.** {verdict}")]
     threads = threads_text(machine["threads"])
     about = [
-        f"Run `{run.name}`, started {meta['started']}"
-        + ("" if meta["finished"] else ", **not finished: only some cells are here**")
-        + ".",
+        f"Run `{run.name}`, started {meta['started']}.",
         f"{machine['cpu']}, {threads}, {machine['os']}; Embree "
         f"{machine['embree'].get('version', '?')}, Numba {machine['packages'].get('numba', '?')}; "
         f"commit {machine.get('git') or 'unknown'}.",
         f"Cells measured: {cells.count('measured')}, failed: {cells.count('failed')}.",
     ]
     parts.append(paragraph(" ".join(about)))
+    if not meta["finished"]:
+        parts.append("This run is **not finished**: only some cells are here.")
     failed = [f"{_name(c)}: {c['error']}" for c in meta["cells"] if c["state"] == "failed"]
     for title, texts in (
         ("Notes", meta["notes"]),

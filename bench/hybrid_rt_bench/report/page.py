@@ -135,7 +135,13 @@ def _broken(text: str, width: int) -> list[str]:
     """Return the lines of a cell."""
     if len(text) <= width:
         return [text]
-    lines = textwrap.wrap(_held(text), max(width, 3), break_on_hyphens=False)
+    # Between parts where that does, else between words, else anywhere.
+    for held in (re.sub("(?<!,) ", HELD, text), _held(text)):
+        lines = textwrap.wrap(held, width, break_on_hyphens=False, break_long_words=False)
+        if max(map(len, lines)) <= width:
+            break
+    else:
+        lines = textwrap.wrap(_held(text), max(width, 3), break_on_hyphens=False)
     return [line.replace(HELD, " ") for line in lines]
 
 

@@ -31,7 +31,7 @@ def scene_notes(run: RunData, scenes: Iterable[str] | None = None) -> list[str]:
     """
     marks = _marks(run)
     named = marks if scenes is None else dict.fromkeys(s for s in scenes if s in marks)
-    return [f"{scene}, {marks[scene][0]}: {marks[scene][1]}." for scene in named]
+    return [f"Scene {scene} ({marks[scene][0]}): {marks[scene][1]}." for scene in named]
 
 
 def with_scene_notes(run: RunData, tables: list[Table]) -> list[Table]:

@@ -29,6 +29,9 @@ U8 = NDArray[np.uint8]
 DPI = 100
 """Pixels an inch of a sheet: a pixel of a picture is one of the sheet's, or a whole number."""
 
+A_POINT = 110
+"""Width of a sheet, pixels, for each point of its text: still read where it fills a page."""
+
 GAP, PAD = 12, 4
 """Between pictures, and between a picture and its caption, pixels."""
 
@@ -109,12 +112,12 @@ def sheet(
     legend : sequence of Entry
         Beneath the pictures.
     points : float
-        Size of texts; 0 chooses one that suits the width of a picture.
+        Size of texts; 0 chooses one that suits the width of the sheet.
     """
     height, width = pictures[0].image.shape[:2]
     columns = min(columns, len(pictures))
     total = columns * width + (columns - 1) * GAP
-    points = points or min(14.0, max(8.0, width / 72))
+    points = points or max(8.0, total / A_POINT)
     line = 1.35 * points * DPI / 72  # of text, pixels
     beneath = [_beneath(picture, width, points) for picture in pictures]
     groups = [beneath[k : k + columns] for k in range(0, len(beneath), columns)]

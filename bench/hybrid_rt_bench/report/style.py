@@ -16,6 +16,7 @@ from matplotlib.textpath import TextToPath
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from hybrid_rt_bench.report.looks import GREY
+from hybrid_rt_bench.report.scenes import scene_name, scene_notes
 from hybrid_rt_bench.report.table import threads_text
 from hybrid_rt_bench.results.folder import RunData
 
@@ -92,15 +93,18 @@ def footer(figure: Figure, *sentences: str) -> None:
 
 
 def told(run: RunData, rows: pd.DataFrame) -> str:
-    """Return in a sentence what rows are of: scenes, views, resolutions, threads, processor."""
+    """Return what rows are of: scenes, views, resolutions, threads, processor; notes of scenes."""
     views = rows[["scene", "camera"]].drop_duplicates()
     machine = run.meta["environment"]
     counts = rows["threads"].unique().tolist() if "threads" in rows else [machine["threads"]]
     threads = threads_text(int(counts[0])) if len(counts) == 1 else "threads as said"
-    return (
-        f"{', '.join(ordered(rows['scene']))}; {len(views)} view{'s' if len(views) != 1 else ''}; "
-        f"{', '.join(resolutions(rows))}; {threads}; {machine['cpu']}."
+    scenes = ordered(rows["scene"])
+    sentence = (
+        f"{', '.join(scene_name(run, scene) for scene in scenes)}; "
+        f"{len(views)} view{'s' if len(views) != 1 else ''}; {', '.join(resolutions(rows))}; "
+        f"{threads}; {machine['cpu']}."
     )
+    return " ".join((sentence, *scene_notes(run, scenes)))
 
 
 def resolutions(rows: pd.DataFrame) -> list[str]:
@@ -129,7 +133,8 @@ def wrapped(text: str, inches: float, points: float, weight: str = "normal") -> 
             for part in text.split("\n")
             for line in textwrap.wrap(part.replace("_", "_ "), count) or [""]
         ]
-        if all(wide(line, points, weight) <= inches for line in lines):
+        # A little less, as what is drawn is fitted to pixels.
+        if all(wide(line, points, weight) <= 0.96 * inches for line in lines):
             break
         count = min(count - 1, max(len(line) for line in lines) - 1)
     else:

@@ -57,7 +57,7 @@ class Table:
             if len(self.columns) > 2:
                 rows = [row[:-1] if len(row) > 1 else row for row in self.rows]
                 parts.append(table_text(self.columns[:-1], rows).rstrip("\n"))
-            parts.append(f"{self.columns[-1]}:")
+            parts.append(f"{self.columns[-1][:1].upper()}{self.columns[-1][1:]}:")
             parts.append(bullets([f"**{r[0]}**: {r[-1]}" for r in self.rows if len(r) > 1]))
         if self.notes:
             parts.append(bullets(self.notes))

@@ -35,7 +35,7 @@ def how_many(some: Sequence[str], total: int, word: str) -> str:
     if not some:
         return f"none of {counted(total, word)}" if total > 1 else f"no {word}"
     if len(some) == total:
-        return f"all {counted(total, word)}" if total > 1 else f"the only {word}"
+        return f"the only {word}" if total == 1 else f"{'both' if total == 2 else 'all'} {word}s"
     return f"{len(some)} of {counted(total, word)}" + (
         f" ({listed(some)})" if len(some) <= MOST_NAMED else ""
     )

@@ -114,6 +114,8 @@ def test_tables_and_figures_are_written(finished):
     text = (folder / "tables.md").read_text()
     for title in ("Table 1.", "Table 2.", "Table 3.", "Alpha", "Errors", "Raster against"):
         assert f"### {title}" in text
+    flat = " ".join(text.split())
+    assert f"**Verdict.** {json.loads(done.stdout)['verdict']} Run `" in flat
     figures = {p.name for p in (folder / "figures").iterdir()}
     for name in ("paper-sphere-front", "paper-sphere-low", "alpha-by-camera"):
         assert {f"{name}.png", f"{name}.svg"} <= figures
@@ -127,13 +129,16 @@ def test_report_renders_an_old_run_and_compare_compares_it(finished, monkeypatch
     with pytest.raises(SystemExit) as stopped:
         cli.main()
     assert stopped.value.code == 0
-    assert "Table 3" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "Table 3" in printed
+    last = printed.strip().split("\n\n")[-1]  # what a reader takes home comes last
+    assert " ".join(last.split()) == json.loads(done.stdout)["verdict"]
     assert (out / name / "tables.md").is_file()
     monkeypatch.setattr(sys, "argv", ["hybrid-rt", "compare", name, name, "--out", str(out)])
     with pytest.raises(SystemExit) as stopped:
         cli.main()
     assert stopped.value.code == 0
-    assert "no difference shown" in capsys.readouterr().out
+    assert "No change" in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -93,6 +93,11 @@ def test_a_known_scene_is_filled_and_its_cameras_are_tried(hybrid_rt, data, tmp_
     assert get_scene("sponza").missing() is None
 
 
+def test_a_scene_that_reports_call_partial_says_so(hybrid_rt, data, tmp_path):
+    said = hybrid_rt("import", write(tmp_path, "obj"), "--name", "bistro")
+    assert "reports will call this scene partial" in said
+
+
 def test_a_folder_that_cannot_be_written_is_said(hybrid_rt, data, tmp_path):
     data.parent.mkdir()
     data.write_text("a file in its place")

@@ -52,8 +52,10 @@ def test_other_techniques_may_fail(monkeypatch, tmp_path, capsys, only_paper):
     (folder / "tables.md").unlink()
     assert invoke(monkeypatch, "report", folder) == 0
     text = (folder / "tables.md").read_text()
-    assert "| zero_area |" in text
-    assert "Triangles without area" in text
+    assert "\n| zero_area " in text
+    assert "- **zero_area**: Triangles without area" in text
+    assert "**Verdict.** Of 3 entrants" in text
+    assert "Of 3 entrants (techniques and tracers) on 3 hard cases" in " ".join(printed.out.split())
     assert (folder / "figures" / "stability.png").stat().st_size > 5000
 
     assert invoke(monkeypatch, "compare", folder, folder) == 2

@@ -83,7 +83,7 @@ def test_with_the_mesh_it_counts_what_the_raster_counts(run, dump, drawn):
     by_technique = data.verdicts.groupby("technique")["count"].sum()
     assert set(by_technique) == {len(rays)}
     names = {path.rpartition("/")[2] for path in summary["files"]}
-    assert {"tables.md", "statuses.png", "errors.png"} <= names
+    assert {"tables.md", "statuses.png", "statuses.svg", "errors.png", "errors.svg"} <= names
 
 
 def test_without_the_mesh_it_tells_alpha_and_statuses_and_says_so(run, dump):
@@ -172,3 +172,47 @@ def test_which_rays_need_no_mesh(drawn):
         else:
             with pytest.raises(hrt.ArgumentError, match="one that knows its triangles"):
                 workload.make(None, alone, 0)
+
+
+def rendered(monkeypatch, capsys, *arguments):
+    """Call `hybrid-rt render`; return its exit code and what it says."""
+    monkeypatch.setattr(sys, "argv", ["hybrid-rt", "render", *map(str, arguments)])
+    with pytest.raises(SystemExit) as stopped:
+        cli.main()
+    return stopped.value.code, " ".join(capsys.readouterr().err.split())
+
+
+def test_a_picture_of_a_frame(dump, tmp_path, monkeypatch, capsys):
+    picture = tmp_path / "frame.png"
+    code, said = rendered(monkeypatch, capsys, "--depth", dump, "-o", picture, "--what", "normals")
+    assert code == 0, said
+    assert "<GBuffer of a depth buffer alone: 64 x 48 pixels" in said
+    alone = np.asarray(Image.open(picture).convert("RGB"))
+    code, said = rendered(
+        monkeypatch, capsys, "cornell", "--depth", dump, "-o", picture, "--what", "normals"
+    )
+    assert code == 0, said
+    assert "<GBuffer of 'cornell': 64 x 48 pixels" in said
+    by_mesh = np.asarray(Image.open(picture).convert("RGB")).astype(int)
+    assert alone.shape == by_mesh.shape
+    assert (np.abs(alone - by_mesh).max(axis=2) <= 1).mean() > 0.95  # but along edges
+    for what in ("depth", "status", "all"):
+        code, said = rendered(monkeypatch, capsys, "--depth", dump, "-o", picture, "--what", what)
+        assert code == 0, said
+        assert len(Image.open(picture).convert("RGB").getcolors(1 << 16)) > 3
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--depth", "{dump}", "--what", "shaded"), "--what: expected depth, normals, status or"),
+        (("--depth", "{dump}", "--size", "8x6"), "--size: expected none beside --depth"),
+        (("cornell", "--far", "3"), "--far: expected none without --depth"),
+        ((), "SCENE: expected a scene, a mesh file or --depth"),
+    ],
+)
+def test_a_picture_that_cannot_be_made(dump, tmp_path, monkeypatch, capsys, options, said):
+    arguments = [text.format(dump=dump) for text in options]
+    code, told = rendered(monkeypatch, capsys, *arguments, "-o", tmp_path / "frame.png")
+    assert code == 2
+    assert said in told

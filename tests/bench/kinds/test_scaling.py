@@ -29,6 +29,7 @@ from hybrid_rt_bench.kinds.scaling.run import (
     plan_series,
 )
 from hybrid_rt_bench.kinds.scaling.spec import Series, parse_counts
+from hybrid_rt_bench.kinds.scaling.stages import STAGES
 from hybrid_rt_bench.measure import memory, strongest
 from hybrid_rt_bench.measure.errors import NothingToRunError
 from hybrid_rt_bench.measure.experiment import Resolution
@@ -576,22 +577,25 @@ def test_no_two_texts_of_a_figure_overlap(tmp_path, axis, sizes):
             check(figure)
 
 
-def test_runs_are_compared_cell_by_cell(tmp_path):
+def test_runs_are_compared_whatever_their_series_are_called(tmp_path):
     a = write_run(tmp_path)
     b = write_run(tmp_path, sizes=(2**14, 2**20), slower=1.5)
-    (table,) = compare_runs(a, b)
-    assert "2 cells in common" in table.title
-    row = row_of(table, "march (certified)")
-    assert row[0] == "2"
-    assert row[1].startswith("1.50 [")
-    assert row[-2:] == ["0.05", "0.05"]
-    assert row_of(table, "hybrid: march to merge (certified)")[1].startswith("1.50 [")
+    found = compare_runs([a], [b])
+    # All stages are slower alike, the baseline too: nothing is, beside it.
+    assert not found.changed
+    march = next(change for change in found.groups if change.timing == "march")
+    assert march.names == {"technique": "certified"}
+    assert march.effect.ratio == pytest.approx(1)
+    assert march.effect.cells == 2
+    assert march.after_ms == pytest.approx(1.5 * march.before_ms)
+    assert {row["triangles"] for row in found.alone[0]} >= {2**11}
+    assert {change.timing for change in found.baselines} == {STAGES["embree"]}
 
 
 def test_runs_without_a_common_cell_or_of_other_kinds_are_not_compared(tmp_path):
     a, b = write_run(tmp_path), write_run(tmp_path, sizes=(2**11,))
     with pytest.raises(hrt.ArgumentError, match="none in common"):
-        compare_runs(a, b)
+        compare_runs([a], [b])
     paper = dataclasses.replace(b, meta={**b.meta, "kind": "paper"})
-    with pytest.raises(hrt.ArgumentError, match="two of kind 'scaling'"):
-        compare_runs(a, paper)
+    with pytest.raises(hrt.ArgumentError, match=r"of one kind .*'scaling'.* of kind 'paper'"):
+        compare_runs([a], [paper])

@@ -38,6 +38,12 @@ def test_the_paper_is_measured_at_its_own_resolutions_and_scenes():
     assert sizes == ["1280x720", "1920x1080", "2560x1440", "3840x2160"]
     assert [scene.row for scene in experiment.scenes] == ["Sphere", "Sponza", "Bistro"]
     assert experiment.row_of("sponza") == "Sponza"
+    quick = load_experiment("paper", quick=True)  # of built-in scenes
+    assert [quick.row_of(name) for name in ("sponza", "bistro", "sphere")] == [
+        "Sponza",
+        "Bistro",
+        "",
+    ]
     assert experiment.row_of("atrium") == ""  # which stands in for Sponza, and is not the paper's
     assert experiment.row_of("kitchen") == ""
 
@@ -53,13 +59,38 @@ def test_every_part_of_a_kind_is_found(name):
     kind = kinds[name]
     assert kind.spec_class().model_fields["kind"].default == name
     assert kind.columns().key_names
-    parts = [kind.runner(), kind.table_maker(), *kind.figure_makers(), kind.comparer()]
-    assert all(callable(part) for part in parts if part is not None)
+    parts = [kind.runner(), kind.table_maker(), *kind.figure_makers()]
+    assert all(callable(part) for part in parts)
     assert kind.experiments()
     assert all(column.meaning for columns in kind.columns().tables.values()
                for column in columns.values())  # fmt: skip
     changes = {option.parameter for option in kind.options if option.changes}
     assert changes <= {"resolutions", "rounds", "techniques"}
+
+
+@pytest.mark.parametrize("name", kinds.names())
+def test_what_is_compared_of_a_kind_are_columns_of_its_schema(name):
+    compared, schema = kinds[name].compared(), kinds[name].columns()
+    results = {**schema.tables["results"], **schema.tables["cell"]}
+    assert set(compared.exact) | set(compared.names) <= set(results) | {"threads"}
+    assert set(compared.cell) <= set(results)
+    assert {column for column, _ in compared.loose} <= set(results)
+    samples = schema.tables["samples"]
+    assert bool(compared.timings) == bool(samples)
+    if samples:
+        assert set(compared.names) <= set(samples)
+    assert sum(not timing.baseline for timing in compared.timings) in (0, 1, 2)
+    for timing in compared.timings:
+        assert timing.amount in {"", *results}
+        assert timing.baseline_amount in {"", *samples}
+        if not compared.stage:
+            assert {*timing.columns, timing.baseline} <= {"", *samples}
+    # Whatever is counted is held to be the same, or is known not to be.
+    counted = {c.name for c in schema.results if c.type is int} - {*compared.names, *compared.cell}
+    settings = {"rounds", "timed_rays", "threads"}
+    memory = {"peak_bytes", "program_bytes", "scene_bytes"}
+    made_of_work = {c for c in counted if c.endswith(("_gathered", "_places"))}
+    assert counted - set(compared.exact) <= settings | memory | made_of_work
 
 
 def test_an_unknown_kind_is_answered_with_the_nearest():

@@ -6,13 +6,15 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+import docs_results
 from hybrid_rt_bench.measure.lifecycle import described
 from hybrid_rt_bench.report.scenes import scene_name, scene_notes, with_scene_notes
 from hybrid_rt_bench.report.table import Table
 from hybrid_rt_bench.results.folder import RunData
 from hybrid_rt_scenes import get_scene, scene_names
+from support import made_runs
 
-NOTE = "hall, half: the roof is absent."
+NOTE = "Scene hall (half): the roof is absent."
 
 
 @pytest.fixture
@@ -66,3 +68,13 @@ def test_bistro_says_what_part_of_the_model_it_is():
     assert spec.mark == "partial"
     for fact in ("1,434,817", "157,181", "ivy"):
         assert fact in spec.note
+
+
+def test_findings_say_what_part_of_a_model_a_scene_is(tmp_path):
+    layout = made_runs.LAYOUTS["one scene, two techniques"]
+    made = made_runs.judged_run(tmp_path, layout, kind="hybrid")
+    run = dataclasses.replace(made, results=made.results.assign(speedup=0.5))
+    scenes = [{**entry, "mark": "half", "note": "no roof"} for entry in run.meta["scenes"]]
+    marked = dataclasses.replace(run, meta={**run.meta, "scenes": scenes})
+    assert "hall (half)" in docs_results.findings({"hybrid": marked}, "")
+    assert "(half)" not in docs_results.findings({"hybrid": run}, "")

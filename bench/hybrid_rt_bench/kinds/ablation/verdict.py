@@ -28,7 +28,7 @@ def verdict(run: RunData) -> str:
     if not found:
         return f"No cell was timed. {strict_words(run.results)}".strip()
     (base, default), *others = found.items()
-    said = [f"Over {where(rows)}, {_march(base, default, run)}"]
+    said = [f"Over {where(run, rows)}, {_march(base, default, run)}"]
     times = {name: pooled.nanoseconds("march_ms") for name, pooled in others}
     factors = {
         name: time / default.nanoseconds("march_ms") for name, time in times.items() if time > 0

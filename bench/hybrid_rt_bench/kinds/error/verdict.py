@@ -21,5 +21,5 @@ def verdict(run: RunData) -> str:
     if rows.empty:
         return f"No cell was timed. {strict_words(run.results)}".strip()
     first, *others = best_words(by_technique(rows), run.samples)
-    said = [f"With default parameters, over {where(rows)}, {first}", *others]
+    said = [f"With default parameters, over {where(run, rows)}, {first}", *others]
     return capital([*said, paying_words(run), strict_words(run.results)])

@@ -24,10 +24,12 @@ SCHEMA = Schema(
             for name in (*WRONG, "wrong_primitive")
         ),
         Column("alpha", "Share of rays that the screen answers", better="higher"),
-        Column("wrong_rate", "Share of false hits and misses, of resolved rays", better="lower"),
+        Column(
+            "wrong_rate", "Share of false hits and misses among the resolved rays", better="lower"
+        ),
         Column("wrong_low", "Lower end of the 95 % interval of wrong_rate"),
         Column("wrong_high", "Upper end of the 95 % interval of wrong_rate"),
-        Column("steps", "Samples of the screen, of all rays together", better="lower"),
+        Column("steps", "Samples of the screen, all rays together", better="lower"),
     ),
     verdicts=(
         text("technique", "Name of the technique"),

@@ -8,7 +8,7 @@ import pandas as pd
 
 from hybrid_rt.judging.rate import Rate
 from hybrid_rt_bench.kinds.frame.columns import WRONG
-from hybrid_rt_bench.report.table import Table, number
+from hybrid_rt_bench.report.table import DASH, Table, number, rate_text
 from hybrid_rt_bench.results.folder import RunData
 
 
@@ -24,7 +24,7 @@ def answers(run: RunData, workload: str) -> Table:
     title = f"What the screen answers of {workload.replace('_', ' ')} rays"
     columns = ["", "alpha", "hits, % of rays", "misses, % of rays", "steps per ray"]
     if judged:
-        columns += ["wrong, % of answers", "wrong primitive, % of answers"]
+        columns += ["wrong, % of resolved rays", "wrong primitive, % of resolved rays"]
     table = Table(title, columns)
     for _, row in rows.iterrows():
         misses = row.resolved - row.hits
@@ -37,8 +37,8 @@ def answers(run: RunData, workload: str) -> Table:
         ]
         if judged:
             cells += [
-                _rate(Rate.of(int(sum(row[name] for name in WRONG)), int(row.resolved))),
-                _rate(Rate.of(int(row.wrong_primitive), int(row.resolved))),
+                rate_text(Rate.of(int(sum(row[name] for name in WRONG)), int(row.resolved))),
+                rate_text(Rate.of(int(row.wrong_primitive), int(row.resolved))),
             ]
         table.rows.append(cells)
     table.notes += [
@@ -49,7 +49,7 @@ def answers(run: RunData, workload: str) -> Table:
         table.notes.append(
             "Wrong: a false hit or a false miss, more than a pixel from what the mesh has. "
             "Wrong primitive: another triangle than the true one, within a pixel. [95 % interval, "
-            "Clopper-Pearson; none seen among N answers: at most 3 / N]."
+            "Clopper-Pearson; none seen among N rays: at most 3 / N]."
         )
     else:
         table.notes.append(
@@ -73,7 +73,7 @@ def ended(run: RunData) -> Table:
 
 
 def _share(row: pd.Series[Any], name: str) -> str:
-    return number(float(row[name])) if name in row else "–"
+    return number(float(row[name])) if name in row else DASH
 
 
 def _frame_words(frame: dict[str, Any]) -> str:
@@ -86,13 +86,3 @@ def _frame_words(frame: dict[str, Any]) -> str:
     elif frame["uncertain"]:
         words += f"; depth is within {frame['uncertainty']:.1g} of itself (median)"
     return words + "."
-
-
-def _rate(rate: Rate) -> str:
-    """Return a rate in per cent with its interval; a zero stays a zero, with its bound."""
-    if rate.total == 0:
-        return "–"
-    low, high = number(100 * rate.low, 2), number(100 * rate.high, 2)
-    return (
-        f"0 [at most {high}]" if rate.count == 0 else f"{number(100 * rate.value)} [{low}, {high}]"
-    )

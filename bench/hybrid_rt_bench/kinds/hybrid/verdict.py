@@ -32,7 +32,7 @@ def verdict(run: RunData) -> str:
         return _others(run)
     found = {tables.name_of(*key): pooled for key, pooled in pools(rows, POINT).items()}
     parts = [_speedup(name, pooled, run) for name, pooled in found.items()]
-    said = [f"Over {where(rows)}, {'; '.join(parts)}."]
+    said = [f"Over {where(run, rows)}, {'; '.join(parts)}."]
     best = max(found.items(), key=lambda item: _value(item[1], run.samples))
     said.append(_scenes(run, *best))
     free = best[1].free_march(run.samples)
@@ -80,5 +80,5 @@ def _others(run: RunData) -> str:
     if rows.empty:
         return "No cell was timed with technique certified."
     first, *others = best_words(by_technique(rows), run.samples)
-    said = ["Technique certified was not timed.", f"Over {where(rows)}, {first}", *others]
+    said = ["Technique certified was not timed.", f"Over {where(run, rows)}, {first}", *others]
     return capital(said)

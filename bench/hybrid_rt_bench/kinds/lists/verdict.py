@@ -27,7 +27,7 @@ def verdict(run: RunData) -> str:
         return f"No cell was timed. {strict_words(run.results)}".strip()
     order = sorted(found, key=lambda name: np.nan_to_num(found[name].mean("lists_mib")))
     first, last = order[0], order[-1]
-    said = [f"Over {where(rows)}, {first} resolves {_what(found[first])}"]
+    said = [f"Over {where(run, rows)}, {first} resolves {_what(found[first])}"]
     if first != last:
         said[0] += f", {last} resolves {_what(found[last])}."
     else:

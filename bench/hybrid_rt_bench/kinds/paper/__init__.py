@@ -14,6 +14,6 @@ register(
         verdict=".verdict:verdict",
         figures=(".figures:plots", ".pictures:figures"),
         options=(*VIEWS, TECHNIQUES),
-        compare=".compare:tables",
+        compare=".compared:COMPARED",
     )
 )

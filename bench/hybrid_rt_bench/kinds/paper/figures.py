@@ -26,6 +26,7 @@ from hybrid_rt_bench.report.looks import (
     Look,
     looks,
 )
+from hybrid_rt_bench.report.scenes import scene_name
 from hybrid_rt_bench.report.style import (
     footer,
     legend,
@@ -87,7 +88,7 @@ def time_over_resolution(run: RunData) -> Figure:
                       rotation_mode="anchor")  # fmt: skip
         ax.set_xlim(0.75 * sizes.pixels.min(), 1.33 * sizes.pixels.max())
         plain_log(ax)
-        title(ax, scene, 3.0)
+        title(ax, scene_name(run, scene), 3.0)
     figure.supylabel("time, ms", fontsize=10)
     _common_legend(figure, axes)
     footer(
@@ -137,7 +138,7 @@ def speedup_by_scene(run: RunData) -> Figure:
                 ax.errorbar(mean.value, y - shift, xerr=error, fmt=marker, ms=5, color=colour,
                             capsize=2, lw=1.2, label=label)  # fmt: skip
         ax.axvline(1, color="black", lw=1, zorder=1)
-        _named_rows(ax, rows, 2.1)
+        _named_rows(run, ax, rows, 2.1)
         title(ax, name, 2.3, fontweight="bold")
         ax.set_xlabel("T(Embree) / T(hybrid)")
     low, high = zip(*(ax.dataLim.intervalx for ax in axes), strict=True)
@@ -173,7 +174,7 @@ def alpha_by_camera(run: RunData) -> Figure:
                                 textcoords="offset points", va="center", fontsize=9)  # fmt: skip
     ax.axvline(paper.ALPHA, color="black", lw=1, ls="--", zorder=1,
                label=f"the paper's mean, {paper.ALPHA}")  # fmt: skip
-    _named_rows(ax, groups, 5.0)
+    _named_rows(run, ax, groups, 5.0)
     ax.set_xlim(-0.012, max(0.5, 1.12 * float(rows.alpha.max())))
     ax.set_xlabel("alpha: share of mirror rays that the screen resolves")
     _common_legend(figure, [ax])
@@ -211,7 +212,7 @@ def errors_by_camera(run: RunData) -> Figure:
         ticks = [t for t in (0, 0.01, 0.1, 1, 10, 100) if t <= top]
         ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
         ax.xaxis.set_minor_locator(NullLocator())
-        _named_rows(ax, groups, 2.4)
+        _named_rows(run, ax, groups, 2.4)
         title(ax, kind.replace("_", " "), 2.4)
     axes[1].set_xlabel("% of the rays that the screen resolves")
     _common_legend(figure, axes)
@@ -259,7 +260,7 @@ def time_of_stages(run: RunData) -> Figure:
         ax.tick_params(axis="y", length=0)
         ax.set_ylim(len(names) - 0.4, -0.7)
         ax.grid(axis="y", visible=False)
-        title(ax, scene, 4.0)
+        title(ax, scene_name(run, scene), 4.0)
         ax.set_xlabel("time per ray, ns")
     handles = [
         Patch(facecolor=how.colour, hatch=how.hatch, edgecolor="white", lw=0)
@@ -297,7 +298,7 @@ def _groups(views: pd.DataFrame) -> list[tuple[str, str]]:
     return lines
 
 
-def _named_rows(ax: Axes, rows: Sequence[tuple[str, str]], inches: float) -> None:
+def _named_rows(run: RunData, ax: Axes, rows: Sequence[tuple[str, str]], inches: float) -> None:
     """Name the lines at the left, and over them, in the first panel, their headings."""
     if ax.get_subplotspec().is_first_col():  # type: ignore[union-attr]
         ax.set_yticks(range(len(rows)), [part for _, part in rows])
@@ -308,7 +309,8 @@ def _named_rows(ax: Axes, rows: Sequence[tuple[str, str]], inches: float) -> Non
         if not part:
             ax.axhline(y - 0.5, color="#D5D5D5", lw=0.7, zorder=0)
             if ax.get_subplotspec().is_first_col():  # type: ignore[union-attr]
-                ax.text(0.01, y, wrapped(scene, inches, 9, "bold"), fontsize=9, fontweight="bold",
+                name = wrapped(scene_name(run, scene), inches, 9, "bold")
+                ax.text(0.01, y, name, fontsize=9, fontweight="bold",
                         transform=ax.get_yaxis_transform(), va="center", linespacing=1.0,
                         bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
                         zorder=4)  # fmt: skip

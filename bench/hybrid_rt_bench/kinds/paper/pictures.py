@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hybrid_rt_bench.kinds.paper.columns import PIXEL_CLASSES
 from hybrid_rt_bench.report import sheet
 from hybrid_rt_bench.report.looks import GREYS, MIDDLE, VERDICTS
+from hybrid_rt_bench.report.scenes import scene_name, scene_notes
 from hybrid_rt_bench.report.sheet import Picture
 from hybrid_rt_bench.report.style import save
 from hybrid_rt_bench.report.table import percent, threads_text
@@ -76,7 +77,7 @@ def figure(run: RunData, cell: dict[str, Any], technique: str, arrays: dict[str,
     return sheet.sheet(
         [
             Picture(
-                view, f"(a) {cell['scene']}, camera {cell['camera']}, "
+                view, f"(a) {scene_name(run, cell['scene'])}, camera {cell['camera']}, "
                 f"{cell['width']}×{cell['height']}",
             ),
             Picture(
@@ -90,6 +91,11 @@ def figure(run: RunData, cell: dict[str, Any], technique: str, arrays: dict[str,
             (VERDICTS["false_hit"], f"wrong {percent(row.wrong_rate)}"),
             (VERDICTS["background"], "no surface"),
         ),
-        foot="Shares of all mirror rays of the view. "
-        f"{threads_text(machine['threads'])}; {machine['cpu']}.",
+        foot=" ".join(
+            (
+                "Shares of all mirror rays of the view.",
+                f"{threads_text(machine['threads'])}; {machine['cpu']}.",
+                *scene_notes(run, [cell["scene"]]),
+            )
+        ),
     )  # fmt: skip

@@ -10,6 +10,9 @@ RESOLUTIONS = ("1280x720", "1920x1080", "2560x1440", "3840x2160")
 
 MACHINE = "RTX 2080 Super"
 
+ROWS = {"nori_sphere": "Sphere", "sponza": "Sponza", "bistro": "Bistro"}
+"""What the paper's tables call those of its scenes that are here, by their names here."""
+
 TRIANGLES = {"Sphere": "1000", "Sponza": "2^18", "Bistro": "2^20"}
 """How many triangles the scenes of the paper have, about."""
 

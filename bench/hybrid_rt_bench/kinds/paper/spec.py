@@ -6,6 +6,7 @@ from typing import Literal, Self
 
 from pydantic import Field
 
+from hybrid_rt_bench.kinds.paper import published
 from hybrid_rt_bench.measure.experiment import (
     Names,
     Passes,
@@ -36,6 +37,10 @@ class PaperExperiment(SceneExperiment):
     warmup: Passes = 1
     derivatives: Literal["plane", "quad"] = "plane"
     selection_rays: SelectionRays = 131072
+
+    def row_of(self, scene: str) -> str:
+        """Return the paper's row for a scene given by name on the command line."""
+        return super().row_of(scene) or published.ROWS.get(scene, "")
 
     def overridden(
         self,

@@ -60,7 +60,8 @@ def table_1(run: RunData) -> Table:
             rows = of_technique(part, technique)
             cells = _by_resolution(rows, columns, lambda r: number(r.march_ms.mean()))
             table.rows.append([f"{technique}: {name}", *cells])
-    table.rows.append([f"{QUOTED}, its own scenes", *_quote(paper.SSRM_MS, columns)])
+    if _all_own(run):
+        table.rows.append([f"{QUOTED}, its own scenes", *_quote(paper.SSRM_MS, columns)])
     table.notes.append(
         f"Technique: scene. Mean over cameras of the median of the rounds; {_threads(run)}. One "
         f"mirror ray for each covered pixel. The paper's: {paper.MACHINE}."
@@ -131,8 +132,10 @@ def table_alpha(run: RunData) -> Table:
             table.rows.append(["mean of the cameras", *cells(of_scene(run, scene), technique)])
         whole = cells(common(run.results), technique)
         table.rows += [[f"{technique}: all scenes"], ["mean of all views", *whole]]
-    table.rows.append([f"{QUOTED}, its own scenes", *[f"{paper.ALPHA:.2f}" for _ in columns]])
-    table.notes.append("Technique: scene. The paper gives one mean over scenes and sizes.")
+    table.notes.append("Technique: scene.")
+    if _all_own(run):
+        table.rows.append([f"{QUOTED}, its own scenes", *[f"{paper.ALPHA:.2f}" for _ in columns]])
+        table.notes.append("The paper gives one mean over its scenes and sizes.")
     return table
 
 
@@ -331,11 +334,21 @@ def _paper_row(
     what: str = "",
 ) -> None:
     """Add what the paper has for a scene, if the scene is the paper's own."""
-    entry = _scene(run, scene)
-    row = str(entry["row"])
-    if row in values and not entry["builtin"]:
+    row = _own_row(run, scene)
+    if row in values:
         name = f"{QUOTED} {row}, about {paper.TRIANGLES[row]} triangles{what}"
         table.rows.append([name, *_quote(values[row], columns)])
+
+
+def _own_row(run: RunData, scene: str) -> str:
+    """Return the row of a scene that is the paper's own; empty for any other."""
+    entry = _scene(run, scene)
+    return "" if entry["builtin"] else str(entry["row"])
+
+
+def _all_own(run: RunData) -> bool:
+    """Tell whether means over all scenes of the run are over scenes of the paper alone."""
+    return all(_own_row(run, scene) in paper.RT_MS for scene in scenes(run))
 
 
 def _quote(values: dict[str, float], columns: list[str]) -> list[str]:

@@ -29,12 +29,13 @@ def verdict(run: RunData) -> str:
         right = min(rated, key=lambda technique: rates[technique].value, default=every[0])
         fast = max(every, key=lambda technique: measured[technique].value)
         shown = list(dict.fromkeys([fast, right]))
-        lead = f" {fast} is the fastest of {len(every)} techniques, {right} the least often wrong;"
+        lead = f" {fast} is the fastest of {len(every)} techniques, {right} the least often wrong."
     parts = [_of(run, rows, technique, measured[technique]) for technique in shown]
     paying = [technique for technique in every if measured[technique].low > 1]
     losing = [technique for technique in every if measured[technique].high < 1]
     said = [
-        f"Of the mirror rays of {views} of {which}:{lead} {'; '.join(parts)}.",
+        f"Measured are the mirror rays of {views} of {which}.{lead}",
+        *parts,
         "Over all views, marching before tracing pays (interval above 1) for "
         f"{how_many(paying, len(every), 'technique')} and costs time (interval below 1) for "
         f"{how_many(losing, len(every), 'technique')}.",
@@ -48,10 +49,10 @@ def _of(run: RunData, every: pd.DataFrame, technique: str, measured: stats.Estim
     rays, resolved = int(rows.rays.sum()), int(rows.resolved.sum())
     estimated = _mean(run, every, technique, estimated=True)
     return (
-        f"technique {technique} answers {number(100 * resolved / max(1, rays))} % and is wrong on "
-        f"{rate_words(_wrong(every, technique))}; where the paper's formula estimates a speed-up "
-        f"of {_text(estimated)} over tracing every ray with the strongest Embree, the measured one "
-        f"is {_text(measured)}"
+        f"Technique {technique} answers {number(100 * resolved / max(1, rays))} % of them and is "
+        f"wrong on {rate_words(_wrong(every, technique))}; its speed-up over tracing every ray "
+        f"with the strongest Embree is {_text(measured)} as measured, and {_text(estimated)} as "
+        "the paper's formula estimates it."
     )
 
 
@@ -86,10 +87,10 @@ def _scenes(run: RunData, rows: pd.DataFrame) -> str:
         }
         low, high = (of(found, key=found.__getitem__) for of in (min, max))
         parts.append(
-            f"of {technique} from {number(found[low])} ({scene_name(run, low)}) to "
-            f"{number(found[high])} ({scene_name(run, high)})"
+            f"of {technique} from {number(found[low])} on {scene_name(run, low)} to "
+            f"{number(found[high])} on {scene_name(run, high)}"
         )
-    return f"By scene the measured speed-up lies, {listed(parts)}."
+    return f"By scene the measured speed-ups go {listed(parts)}."
 
 
 def _text(estimate: stats.Estimate) -> str:

@@ -14,6 +14,7 @@ register(
         verdict=".verdict:verdict",
         figures=(".figures:figures",),
         options=VIEWS,
+        compare=".compared:COMPARED",
         listing=".programs:listing",
     )
 )

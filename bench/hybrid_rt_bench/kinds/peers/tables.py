@@ -10,7 +10,7 @@ import pandas as pd
 from hybrid_rt.judging.rate import Rate
 from hybrid_rt_bench.kinds.peers.columns import SCHEMA
 from hybrid_rt_bench.report.scenes import scene_name
-from hybrid_rt_bench.report.table import DASH, Table, interval, number, rate_text
+from hybrid_rt_bench.report.table import DASH, Table, interval, number, rate_text, threads_text
 from hybrid_rt_bench.report.words import listed
 from hybrid_rt_bench.results import statistics as stats
 from hybrid_rt_bench.results.folder import RunData
@@ -58,9 +58,10 @@ def rays(run: RunData) -> Table:
             )
     rounds, threads = run.meta["spec"]["rounds"], run.meta["environment"]["threads"]
     table.notes += [
-        f"Mean over views ({views_text(run)}) of the median of {rounds} rounds; {threads} threads "
-        "where a program takes a number. In each round a peer runs right beside the strongest "
-        "Embree on the same rays. Time per ray over that of the strongest Embree: geometric mean "
+        f"Mean over views ({views_text(run)}) of the median of {rounds} rounds; "
+        f"{threads_text(threads)} where a program takes a number. In each round a peer runs right "
+        "beside the strongest Embree on the same rays. Time per ray over that of the strongest "
+        "Embree: geometric mean "
         "over views of the median of the paired ratios, [95 % bootstrap interval over rounds]; "
         "the row embree is that against itself.",
         "Timed: from rays in a peer's own arrays to its evaluated results. Making those arrays, "

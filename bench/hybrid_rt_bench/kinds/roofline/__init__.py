@@ -14,5 +14,6 @@ register(
         verdict=".verdict:verdict",
         figures=(".figures:plots",),
         options=VIEWS,
+        compare=".compared:COMPARED",
     )
 )

@@ -14,6 +14,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from hybrid_rt_bench.kinds.roofline.reckon import STRUCTURES, far_gathers_ns, near_gathers_ns
 from hybrid_rt_bench.kinds.roofline.tables import view
 from hybrid_rt_bench.report.looks import AMBER, BLACK, BLUE, GREY, ORANGE, PURPLE, SKY, Look
+from hybrid_rt_bench.report.scenes import scene_name
 from hybrid_rt_bench.report.style import (
     footer,
     legend,
@@ -60,7 +61,7 @@ def gather_rate(run: RunData) -> Figure:
                     ms=4.5, label=f"{threads_text(threads)}, {NAMES[kind]}",
                 )  # fmt: skip
         _mark(ax, run.results[run.results.scene == scene].iloc[0], rates)
-        title(ax, scene, 4.5)
+        title(ax, scene_name(run, scene), 4.5)
         ax.set(xscale="log", yscale="log")
         ax.xaxis.set_major_locator(LogLocator(base=4, numticks=20))
         ax.xaxis.set_major_formatter(FuncFormatter(lambda kib, _: _size(kib)))

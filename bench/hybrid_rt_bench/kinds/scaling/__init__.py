@@ -17,6 +17,6 @@ register(
         verdict=".verdict:verdict",
         figures=(".figures:plots",),
         options=(SERIES, TRIANGLES, RESOLUTIONS, ROUNDS, TECHNIQUES),
-        compare=".compare:tables",
+        compare=".compared:COMPARED",
     )
 )

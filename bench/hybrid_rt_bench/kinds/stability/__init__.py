@@ -16,5 +16,6 @@ register(
         verdict=".verdict:verdict",
         figures=(".figures:figures",),
         options=(CASES, TECHNIQUES),
+        compare=".compared:COMPARED",
     )
 )
