@@ -63,7 +63,8 @@ def rasterize(
     Coverage: vertices are projected in float64 and snapped to 1/256 pixel; integer edge functions
     with the top-left rule decide at pixel centres, so meshes are watertight. Triangles are clipped
     at the near plane and, beyond tens of thousands of pixels, at a guard band; an edge is cut at
-    the same point for both of its triangles.
+    the same point for both of its triangles. What lies beyond an orthographic camera's far plane
+    has a depth below 0 and loses against nothing; a pinhole camera's `far` cuts nothing off.
 
     Depth: the plane of the unsnapped vertices in float64, kept within the range of the vertices'
     depths, because the snapped outline may reach past the true one, where a plane seen nearly
