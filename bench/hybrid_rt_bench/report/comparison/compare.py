@@ -178,6 +178,7 @@ class _Times:
     ) -> None:
         self.cell, self.names, self.sides, self.same_path = cell, names, sides, same_path
         self.common = _in_order(sides)
+        self.short = _short_ones(sides, self.common)
         self.runs = sum(map(len, sides))
 
     def groups(self) -> list[Change]:
@@ -248,10 +249,19 @@ class _Times:
         )
 
     def _short(self, key: Place) -> bool:
-        found = pd.DataFrame([f.loc[key] for side in self.sides for f in side if key in f.index])
-        # The fastest of all rounds: in others the scheduler makes a short stage long.
-        small = found.level.min() < np.log(SHORT) and bool(found.baseline.notna().all())
-        return bool(small or found.shorter.min() < SHORTEST)
+        return key in self.short
+
+
+def _short_ones(sides: list[list[pd.DataFrame]], keys: list[Place]) -> set[Place]:
+    """Return the rows that are too short to be judged.
+
+    Of all rounds the fastest counts: in others the scheduler makes a short stage long.
+    """
+    every = pd.concat([frame for side in sides for frame in side])
+    least = every[["level", "shorter", "baseline"]].groupby(level=list(range(every.index.nlevels)))
+    low = least.min()
+    small = (low.level < np.log(SHORT)) & low.baseline.notna() | (low.shorter < SHORTEST)
+    return set(low.index[small]) & set(keys)
 
 
 def _milliseconds(side: Side) -> float:

@@ -13,7 +13,7 @@ from hybrid_rt_bench.results.files import ReportsError
 from hybrid_rt_bench.results.folder import RunData
 from hybrid_rt_bench.results.schema import Schema
 
-MEASURES = ["timing", "round", "seconds", "baseline"]
+MEASURES = ["timing", "round", "seconds", "baseline", "per"]
 """The columns of `rounds_of` besides those that name a row."""
 
 
@@ -30,7 +30,8 @@ def rounds_of(run: RunData, compared: Compared, schema: Schema) -> pd.DataFrame:
     DataFrame
         The columns of `identity`, the kind's names (empty or 0 where a timing has none),
         ``timing``, ``round``, ``seconds`` and ``baseline``: the seconds of the strongest tracer in
-        the same round, NaN for a time that is a baseline itself.
+        the same round, NaN for a time that is a baseline itself. ``per``: by what their ratio is
+        multiplied, where they did not do the same amount of work.
 
     Raises
     ------
@@ -90,13 +91,13 @@ def _timed(wide: pd.DataFrame, timing: Timing, compared: Compared, schema: Schem
     if not _has(wide, [*timing.columns, *filter(None, [timing.baseline])]):
         return pd.DataFrame()
     seconds = wide[list(timing.columns)].sum(axis=1, skipna=False)
-    kept = wide.assign(timing=timing.name, seconds=seconds, baseline=np.nan)
+    kept = wide.assign(timing=timing.name, seconds=seconds, baseline=np.nan, per=1.0)
     if timing.baseline:
         kept["baseline"] = wide[timing.baseline]
         if timing.baseline_amount:
-            kept["baseline"] /= wide[timing.baseline_amount]
+            kept["per"] *= wide[timing.baseline_amount]
     if timing.amount:
-        kept["seconds"] /= wide[timing.amount]
+        kept["per"] /= wide[timing.amount]
     kept = kept[kept.seconds.notna() & (kept.baseline.notna() | (not timing.baseline))]
     if timing.of is not None:
         for name in compared.names:
@@ -134,7 +135,7 @@ def middles(rounds: pd.DataFrame, place: Sequence[str]) -> pd.DataFrame:
     for key, part in rounds.groupby(list(place), sort=False):
         seconds, baseline = part.seconds.to_numpy(), part.baseline.to_numpy()
         raw = bool(np.isnan(baseline).any())
-        level, variance = middle(seconds, np.ones(len(seconds)) if raw else baseline)
+        level, variance = middle(seconds, np.ones(len(seconds)) if raw else baseline / part.per)
         beside = np.log(baseline)  # all NaN where there is none
         found = (float(np.median(seconds)), float(np.median(beside)), deviation(beside))
         shorter = float(np.fmin(seconds.min(), np.exp(beside.min())))
