@@ -105,7 +105,7 @@ def told_of(whole, folder):
     try:
         run = read_run(folder)
         render_run(run)
-        compare_runs(whole, run)
+        compare_runs([whole], [run])
     except hrt.HybridRTError as error:
         return str(error)
     return None

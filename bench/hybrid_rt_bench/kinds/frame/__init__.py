@@ -15,6 +15,7 @@ register(
         schema=".columns:SCHEMA",
         tables=".tables:tables",
         verdict=".verdict:verdict",
+        compare=".compared:COMPARED",
         figures=(".figures:figures",),
         options=(*FRAME, TECHNIQUES),
     )
