@@ -18,7 +18,7 @@ help:
 	@echo "make oldest     try everything once with the oldest dependencies that are allowed"
 	@echo "make fuzz       junk at every argument of the public API, and damaged mesh files, all of it"
 	@echo "make corpus COLLECTIONS='NAME=FOLDER ...'  compare mesh readers over public collections"
-	@echo "make reference-runs  measure what stands behind docs/results: 45 minutes on a quiet machine"
+	@echo "make reference-runs  measure what stands behind docs/results: half an hour on a quiet machine"
 	@echo "make results    render docs/results and the findings in README from the runs committed there"
 	@echo "make cold-start  seconds that the first picture waits for compilation"
 	@echo "make compare-aa  runs of one program and of a slower one: what \`hybrid-rt compare\` says"

@@ -30,6 +30,8 @@ def measure(twice, out, rounds, threads):
     import hybrid_rt as hrt
     from hybrid_rt_bench.cli import main
 
+    again = {}
+
     class Planted(hrt.Paper):
         """The paper's march, with a share of the rays marched again."""
 
@@ -39,9 +41,12 @@ def measure(twice, out, rounds, threads):
         def _march(self, rays, screen, any_hit, threads):
             marched = super()._march(rays, screen, any_hit, threads)
             if twice:
-                blocks = np.arange(len(rays)) // BLOCK
-                again = np.flatnonzero(blocks * twice % 1 < twice)
-                super()._march(rays.take(again), screen, any_hit, threads)
+                # Chosen once for the rays of a cell: the time to choose them is not the march's.
+                if id(rays) not in again:
+                    blocks = np.arange(len(rays)) // BLOCK
+                    chosen = rays.take(np.flatnonzero(blocks * twice % 1 < twice))
+                    again[id(rays)] = rays, chosen
+                super()._march(again[id(rays)][1], screen, any_hit, threads)
             return marched
 
     hrt.register(Planted)

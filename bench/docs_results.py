@@ -1,10 +1,14 @@
-"""Render docs/results/ and the findings in README: ``python bench/docs_results.py``.
+"""Render docs/results/, the findings in README and the tables in docs.
 
 Everything comes from the runs that are committed in docs/results/NAME: each gets its tables.md and
-figures/, docs/results/README.md says what there is, and README.md its three findings. Nothing else
-writes a figure into README.
+figures/, docs/results/README.md says what there is, README.md gets its three findings, and pages of
+docs get the tables that they ask for, between lines like these:
+
+    <!-- table of paper: Table 1. March (SSRM), mean time -->
+    <!-- end of table -->
 """
 
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -15,12 +19,17 @@ import pandas as pd
 
 from hybrid_rt.judging.rate import Rate
 from hybrid_rt_bench.report.scenes import scene_name
+from hybrid_rt_bench.report.table import Table
 from hybrid_rt_bench.results.folder import RunData
 from hybrid_rt_bench.runs import read_run, render_run
 from reference_runs import RESULTS, ROOT, RUNS
 
 README = ROOT / "README.md"
 BEGIN, END = "<!-- findings: written by `make results` -->\n", "<!-- end of findings -->\n"
+
+DOCS = ROOT / "docs"
+TABLE = re.compile(r"(<!-- table of (\w+): (.*?) -->\n)(.*?)(<!-- end of table -->\n)", re.DOTALL)
+"""What asks for a table: the run, the title, what was there before."""
 
 THICKNESS = ("linear", "dda", "hiz")
 """Techniques that guess how thick surfaces are."""
@@ -77,12 +86,12 @@ def index(runs: dict[str, RunData]) -> str:
         lines.append(f"| {name} | `hybrid-rt {words}` | {made} |")
     lines += [
         "",
-        "`make reference-runs` makes all of them, in about 45 minutes on two cores that do nothing "
-        "else; `python bench/reference_runs.py NAME` makes one. They need the scenes sponza, "
-        "bistro and nori_sphere ([scenes](../scenes.md)). Then `make results`.",
+        "`make reference-runs` makes all of them, in about half an hour on two cores that do "
+        "nothing else; `python bench/reference_runs.py NAME` makes one. They need the scenes "
+        "sponza, bistro and nori_sphere ([scenes](../scenes.md)). Then `make results`.",
         "",
-        "[certified.md](../certified.md) and [performance.md](../performance.md) tell of earlier, "
-        "larger runs, each named there by its commit and its command; their files are not kept.",
+        "[certified.md](../certified.md) and [performance.md](../performance.md) show tables of "
+        "these runs, put there by `make results`.",
         "",
         "[corpus.md](corpus.md) compares the readers of mesh files with others, by `make corpus`.",
         "",
@@ -95,6 +104,27 @@ def with_findings(text: str, runs: dict[str, RunData]) -> str:
     before, rest = text.split(BEGIN)
     _, after = rest.split(END)
     return before + BEGIN + findings(runs, "docs/") + END + after
+
+
+def with_tables(text: str, tables: dict[str, list[Table]]) -> str:
+    """Return the text of a page with its tables in their places; `tables` are those of each run.
+
+    A run that is not committed leaves its tables out. Raise if a run has no table of that title.
+    """
+
+    def placed(found: re.Match[str]) -> str:
+        begin, name, title, _, end = found.groups()
+        if name not in tables:
+            return begin + end
+        for table in tables[name]:
+            if table.title == title:
+                words = f"*`hybrid-rt {RUNS[name]}`, [all its tables](results/{name}/tables.md).*"
+                _, _, body = table.markdown().partition("\n\n")
+                return f"{begin}\n{body}\n{words}\n\n{end}"
+        titles = "; ".join(table.title for table in tables[name])
+        raise ValueError(f"run {name} has no table {title!r}, but {titles}")
+
+    return TABLE.sub(placed, text)
 
 
 def _made(run: RunData) -> str:
@@ -182,11 +212,15 @@ def _words(names: Iterable[Any]) -> str:
 def main() -> None:
     """Write everything, and say what."""
     runs = committed()
+    tables = {}
     for name, run in runs.items():
         for path in (run.folder / "figures").glob("**/*.*"):
             path.unlink()
-        _, written = render_run(run)
+        tables[name], written = render_run(run)
         print(f"{name}: {len(written)} files")
+    for page in sorted(DOCS.glob("*.md")):
+        text = page.read_text(encoding="utf-8")
+        page.write_text(with_tables(text, tables), encoding="utf-8")
     (RESULTS / "README.md").write_text(index(runs), encoding="utf-8")
     text = README.read_text(encoding="utf-8")
     README.write_text(with_findings(text, runs), encoding="utf-8")

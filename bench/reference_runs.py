@@ -1,7 +1,7 @@
 """Make the runs behind docs/results/: ``python bench/reference_runs.py [NAME ...]``.
 
-They take about 45 minutes on two cores, which nothing else should use meanwhile, and need the real
-scenes. Each is measured into reports/, and what is small of its folder takes the place of
+They take about half an hour on two cores, which nothing else should use meanwhile, and need the
+real scenes. Each is measured into reports/, and what is small of its folder takes the place of
 docs/results/NAME. `make results` then renders tables, figures and findings from there.
 """
 
@@ -20,8 +20,7 @@ RESULTS = ROOT / "docs" / "results"
 
 RUNS = {
     "stability": "run stability",
-    "error": "run error --scenes sponza,bistro,atrium --cameras nave,gallery,corner,street "
-    "--resolutions 1280x720",
+    "error": "run error --scenes sponza,bistro,atrium --cameras nave,street --resolutions 1280x720",
     "hybrid": "run hybrid --scenes sponza,bistro,street --resolutions 1920x1080",
     "paper": "run paper --cameras front,low,nave,gallery,corner,street "
     "--resolutions 1280x720,1920x1080,3840x2160 --rounds 5",
