@@ -266,18 +266,22 @@ def _name(figure: Figure, ax: Axes, dots: Sequence[Dot]) -> None:
     texts = []
     for dot in named:
         text = f"Embree, {dot.label}" if dot.technique == EMBREE else dot.technique
+        place = 100 * dot.error.value
         if dot.error.count == 0:
+            # Right of the band of zeros: at the left edge there is no room about a dot.
+            place = ax.get_xlim()[0] * -1.1
             text += f"\n0 of {_count(dot.error.total)} (< {100 * dot.error.high:.1e} %)"
         texts.append(
             ax.text(
-                100 * dot.error.value, dot.worth, text, fontsize=10, fontweight="bold", zorder=5,
+                place, dot.worth, text, fontsize=10, fontweight="bold", zorder=2.7,
                 color=look[dot.technique].colour, linespacing=1.1, in_layout=False,
                 bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.8},
-            )
+            )  # beneath the dots: a name never hides one
         )  # fmt: skip
     adjust_text(
         texts, [100 * dot.error.value for dot in dots], [dot.worth for dot in dots], ax=ax,
-        expand=(1.12, 1.35), force_text=(0.3, 0.5), force_static=(0.2, 0.4), min_arrow_len=12,
+        target_x=[100 * dot.error.value for dot in named], target_y=[dot.worth for dot in named],
+        expand=(1.12, 1.35), force_text=(0.4, 0.6), force_static=(0.5, 0.9), min_arrow_len=12,
         iter_lim=NAMED_AFTER,
         arrowprops={"arrowstyle": "-", "color": GREY, "lw": 0.7},
     )  # fmt: skip
