@@ -20,6 +20,8 @@ ONE = np.int32(1)
 ZERO = np.int32(0)
 NONE = np.int32(-1)
 INF = np.float32(np.inf)
+BLOCKED = -1
+"""Status of a ray that a pixel stops: how it ends is for `finish` to say."""
 
 
 class Lines(NamedTuple):
@@ -167,13 +169,13 @@ class Walk(NamedTuple):
     own: object
 
 
-@inlined
-def walk_of(rays, kept, width, height):
-    """Return the walks of rays that begin.
+def begin_walk(numbers, buffers, pyramid, rays, kept):
+    """Begin rays, as `driver.begin`, for all techniques that walk through a pyramid.
 
     A ray on the visible surface of its own pixel leaves that pixel unread: the surface would only
     be compared with itself.
     """
+    height, width = buffers.depth.shape
     line = lines_of(rays)
     cx, cy = pixel_of(line.x, width), pixel_of(line.y, height)
     own = (cx == kept.own_x) & (cy == kept.own_y)
@@ -190,6 +192,16 @@ def reading(walk, active, max_steps, counts):
     reads = reads & ~tired
     count_steps(counts, walk.level, reads)
     return reads, tired, simd.select(reads, walk.steps + ONE, walk.steps)
+
+
+@inlined
+def behind_nearest(walk, cell, reads, pyramid, bits):
+    """Return the nearest depths of cells in a depth pyramid, and where these block rays."""
+    line = walk.line
+    at = cells_of(walk.level, cell.x, cell.y, bits)
+    nearest = simd.gather(pyramid.cells, at, reads, F0)
+    farthest_ray = line.z + line.dz * simd.select(line.dz < F0, cell.s, walk.s)
+    return nearest, reads & (nearest > F0) & ~(farthest_ray > nearest)
 
 
 @inlined

@@ -15,12 +15,12 @@ from hybrid_rt.kernels.techniques.cells import (
     NONE,
     ZERO,
     Walk,
-    cells_of,
+    begin_walk,
+    behind_nearest,
     exits_of,
     limited,
     onwards,
     reading,
-    walk_of,
     within,
 )
 from hybrid_rt.kernels.techniques.driver import Answers, begins, finishes, steps
@@ -47,11 +47,7 @@ class HiZNumbers(NamedTuple):
     top: int
 
 
-@begins(HiZNumbers)
-def hiz_begin(numbers, buffers, pyramid, rays, kept):
-    """Begin rays, as `driver.begin`."""
-    height, width = buffers.depth.shape
-    return walk_of(rays, kept, width, height)
+begins(HiZNumbers)(begin_walk)
 
 
 @steps(HiZNumbers)
@@ -61,10 +57,7 @@ def hiz_step(numbers, buffers, pyramid, kept, state, active, counts):
     line, level, s = state.line, state.level, state.s
     cell = exits_of(line, state.cx, state.cy, level)
     reads, tired, taken = reading(state, active, numbers.max_steps, counts)
-    at = cells_of(level, cell.x, cell.y, numbers.bits)
-    nearest = simd.gather(pyramid.cells, at, reads, F0)
-    farthest_ray = line.z + line.dz * simd.select(line.dz < F0, cell.s, s)
-    blocked = reads & (nearest > F0) & ~(farthest_ray > nearest)
+    nearest, blocked = behind_nearest(state, cell, reads, pyramid, numbers.bits)
     # In front at its entry: it meets the cell's depth on its way away from the eye.
     above = blocked & (line.z + line.dz * s > nearest)
     s = simd.select(above, limited((nearest - line.z) / line.dz, s, simd.maximum(cell.s, s)), s)

@@ -9,20 +9,18 @@ import numpy as np
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._jit import inlined
 from hybrid_rt.kernels.techniques.cells import (
+    BLOCKED,
     F0,
     HALF,
     NONE,
-    cells_of,
+    begin_walk,
+    behind_nearest,
     exits_of,
     onwards,
     reading,
-    walk_of,
 )
 from hybrid_rt.kernels.techniques.driver import Answers, begins, finishes, steps
 from hybrid_rt.kernels.techniques.screen import HIDDEN, HIT
-
-BLOCKED = -1
-"""Status of a ray that a pixel blocks: that pixel's plane will tell."""
 
 
 class PaperNumbers(NamedTuple):
@@ -34,24 +32,16 @@ class PaperNumbers(NamedTuple):
     top: int
 
 
-@begins(PaperNumbers)
-def paper_begin(numbers, buffers, pyramid, rays, kept):
-    """Begin rays, as `driver.begin`."""
-    height, width = buffers.depth.shape
-    return walk_of(rays, kept, width, height)
+begins(PaperNumbers)(begin_walk)
 
 
 @steps(PaperNumbers)
 def paper_step(numbers, buffers, pyramid, kept, state, active, counts):
     """Take a step, as `driver.step`."""
     height, width = buffers.depth.shape
-    line = state.line
-    cell = exits_of(line, state.cx, state.cy, state.level)
+    cell = exits_of(state.line, state.cx, state.cy, state.level)
     reads, tired, taken = reading(state, active, numbers.max_steps, counts)
-    at = cells_of(state.level, cell.x, cell.y, numbers.bits)
-    nearest = simd.gather(pyramid.cells, at, reads, F0)
-    farthest_ray = line.z + line.dz * simd.select(line.dz < F0, cell.s, state.s)
-    blocked = reads & (nearest > F0) & ~(farthest_ray > nearest)
+    _, blocked = behind_nearest(state, cell, reads, pyramid, numbers.bits)
     return onwards(
         state, cell, active, blocked, tired, taken, numbers.samples, numbers.top, width, height,
         BLOCKED,

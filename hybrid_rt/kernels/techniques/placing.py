@@ -22,7 +22,14 @@ import numpy as np
 
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._jit import inlined
-from hybrid_rt.kernels.techniques.screen import BEFORE_FAR, INVALID, MISS, NEAR, OFFSCREEN
+from hybrid_rt.kernels.techniques.screen import (
+    BEFORE_FAR,
+    INVALID,
+    MISS,
+    NEAR,
+    OFFSCREEN,
+    mapped,
+)
 
 LANES = 2 * simd.WIDTH
 """Rays that are marched at a time: two registers of them, so that one does not wait for the other.
@@ -57,12 +64,6 @@ class ScreenRays(NamedTuple):
     length: object
     t_near: object
     scale: object
-
-
-@inlined
-def mapped(m, k, x, y, z):
-    """Return row k of a map, without its constant, times a vector."""
-    return m[k, 0] * x + m[k, 1] * y + m[k, 2] * z
 
 
 @inlined

@@ -9,14 +9,15 @@ import numpy as np
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._jit import inlined
 from hybrid_rt.kernels.techniques.cells import (
+    BLOCKED,
     F0,
     HALF,
     NONE,
+    begin_walk,
     cells_of,
     exits_of,
     onwards,
     reading,
-    walk_of,
 )
 from hybrid_rt.kernels.techniques.driver import Answers, begins, finishes, steps
 from hybrid_rt.kernels.techniques.placing import LANES
@@ -26,9 +27,6 @@ from hybrid_rt.kernels.techniques.screen import HIDDEN, HIT
 # plane's value, some half-ulps each, and of the place on the screen, a half-ulp of the coordinate
 # times the slope for the ray's product, its sum and the plane's centre.
 ROUNDING = np.float32(2.0**-22)
-
-BLOCKED = -1
-"""Status of a ray that a pixel's plane blocks."""
 
 
 class SlopeNumbers(NamedTuple):
@@ -40,11 +38,7 @@ class SlopeNumbers(NamedTuple):
     top: int
 
 
-@begins(SlopeNumbers)
-def slope_begin(numbers, buffers, pyramid, rays, kept):
-    """Begin rays, as `driver.begin`."""
-    height, width = buffers.depth.shape
-    return walk_of(rays, kept, width, height)
+begins(SlopeNumbers)(begin_walk)
 
 
 @inlined

@@ -54,6 +54,7 @@ from hybrid_rt.kernels.techniques.certified.slots import (
     S,
     put,
 )
+from hybrid_rt.kernels.techniques.placing import finite
 from hybrid_rt.kernels.techniques.screen import (
     BEFORE_FAR,
     INVALID,
@@ -61,19 +62,8 @@ from hybrid_rt.kernels.techniques.screen import (
     NEAR,
     OFFSCREEN,
     UNDECIDED,
+    mapped,
 )
-
-
-@inlined
-def row_of(m, k, x, y, z):
-    """Return row k of a map, without its constant, times a vector."""
-    return m[k, 0] * x + m[k, 1] * y + m[k, 2] * z
-
-
-@inlined
-def finite(x):
-    """Return where x is neither infinite nor NaN."""
-    return simd.absolute(x) < INFINITY
 
 
 @inlined
@@ -120,14 +110,14 @@ def set_up(index, live, slot, rays, size, box, slots_f, slots_i, slots_d, how_ou
     valid = finite(ox + oy + oz) & finite(length) & (length > 0.0) & (start < INFINITY)
     valid = valid & (stop >= start) & (start <= INFINITY)
     px, py, pz = ox + start * dx - eye[0], oy + start * dy - eye[1], oz + start * dz - eye[2]
-    w, d = row_of(m, 2, px, py, pz) + m[2, 3], row_of(m, 3, px, py, pz) + m[3, 3]
+    w, d = mapped(m, 2, px, py, pz) + m[2, 3], mapped(m, 3, px, py, pz) + m[3, 3]
     in_front = valid & (w >= d)
-    x = (row_of(m, 0, px, py, pz) + m[0, 3]) / w
-    y = (row_of(m, 1, px, py, pz) + m[1, 3]) / w
+    x = (mapped(m, 0, px, py, pz) + m[0, 3]) / w
+    y = (mapped(m, 1, px, py, pz) + m[1, 3]) / w
     depth = d / w
     placed = in_front & (x >= 0.0) & (x <= width) & (y >= 0.0) & (y <= height) & (depth > 0.0)
-    gx, gy = row_of(m, 0, dx, dy, dz), row_of(m, 1, dx, dy, dz)
-    gw, gd = row_of(m, 2, dx, dy, dz), row_of(m, 3, dx, dy, dz)
+    gx, gy = mapped(m, 0, dx, dy, dz), mapped(m, 1, dx, dy, dz)
+    gw, gd = mapped(m, 2, dx, dy, dz), mapped(m, 3, dx, dy, dz)
     delta_x, delta_y, delta_z = gx - x * gw, gy - y * gw, gd - depth * gw
     ahead, closer = gw > 0.0, ~(gw > 0.0) & (gw < gd)
     farther = ~ahead & ~closer & (gd < 0.0)
