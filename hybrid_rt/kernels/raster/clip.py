@@ -33,14 +33,20 @@ MAX_CORNERS = 8
 
 
 @inlined
+def mapped(m, k, x, y, z):
+    """Return row k of a map, without its constant, times a vector or vectors."""
+    return m[k, 0] * x + m[k, 1] * y + m[k, 2] * z
+
+
+@inlined
 def project(p0, p1, p2, eye, m):
     """Return q = M (p - eye, 1) of a world point in float64, or of a vector of points."""
     r0, r1, r2 = p0 - eye[0], p1 - eye[1], p2 - eye[2]
     return (
-        m[0, 0] * r0 + m[0, 1] * r1 + m[0, 2] * r2 + m[0, 3],
-        m[1, 0] * r0 + m[1, 1] * r1 + m[1, 2] * r2 + m[1, 3],
-        m[2, 0] * r0 + m[2, 1] * r1 + m[2, 2] * r2 + m[2, 3],
-        m[3, 0] * r0 + m[3, 1] * r1 + m[3, 2] * r2 + m[3, 3],
+        mapped(m, 0, r0, r1, r2) + m[0, 3],
+        mapped(m, 1, r0, r1, r2) + m[1, 3],
+        mapped(m, 2, r0, r1, r2) + m[2, 3],
+        mapped(m, 3, r0, r1, r2) + m[3, 3],
     )
 
 

@@ -37,6 +37,7 @@ import numpy as np
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._jit import inlined
 from hybrid_rt.kernels._rows import transposed
+from hybrid_rt.kernels.raster.clip import mapped
 from hybrid_rt.kernels.raster.lists_bins import LANES, SLACK, row
 
 EDGE_ON = 1024.0
@@ -107,12 +108,6 @@ def boxes_of(spans):
 def size(x, y, z):
     """Return the sum of the sizes of three coordinates."""
     return simd.absolute(x) + simd.absolute(y) + simd.absolute(z)
-
-
-@inlined
-def times(frame, row, x, y, z):
-    """Return the scalar products of vectors with the first three of a row of `frame`."""
-    return x * frame[row, 0] + y * frame[row, 1] + z * frame[row, 2]
 
 
 @inlined
@@ -208,15 +203,15 @@ def set_up(
     n_slack = SLACK * size(ux, uy, uz) * size(vx, vy, vz)
     k = nx * ax + ny * ay + nz * az
     k_slack = n_slack * size(ax, ay, az)
-    d = k * frame[3, 3] - times(frame, 3, nx, ny, nz)
+    d = k * frame[3, 3] - mapped(frame, 3, nx, ny, nz)
     d_slack = k_slack * abs(frame[3, 3]) + n_slack * size_of(frame, 3)
     sloped = simd.absolute(d) > EDGE_ON * d_slack
     side = simd.select(d > 0.0, simd.f64(1.0, LANES), -1.0)
     scale = 1.0 / simd.select(sloped, side * d - d_slack, 1.0)
     towards = side * sigma
-    pa = towards * times(frame, 0, nx, ny, nz)
-    pb = towards * times(frame, 1, nx, ny, nz)
-    pc = towards * (times(frame, 2, nx, ny, nz) - k * frame[2, 3])
+    pa = towards * mapped(frame, 0, nx, ny, nz)
+    pb = towards * mapped(frame, 1, nx, ny, nz)
+    pc = towards * (mapped(frame, 2, nx, ny, nz) - k * frame[2, 3])
     reach = n_slack * (sigma * (
         width * size_of(frame, 0) + height * size_of(frame, 1) + size_of(frame, 2)
     )) + k_slack * (sigma * abs(frame[2, 3]))  # fmt: skip

@@ -14,6 +14,7 @@ from hybrid_rt.kernels._queue import take
 from hybrid_rt.kernels._rows import transposed
 from hybrid_rt.kernels.raster._order import entry
 from hybrid_rt.kernels.raster.bins import put_in_tiles
+from hybrid_rt.kernels.raster.clip import mapped
 from hybrid_rt.kernels.raster.cull import (
     PIECES,
     box_of,
@@ -56,12 +57,6 @@ def stored(slope):
 
 
 @inlined
-def row_of(m, k, x, y, z):
-    """Return row k of a map, without its constant, times vectors."""
-    return m[k, 0] * x + m[k, 1] * y + m[k, 2] * z
-
-
-@inlined
 def depth_of(w, d):
     """Return depths d / w of vertices, 1 for those that are not in front of the near plane."""
     return simd.select(w > d, d / w, 1.0)
@@ -98,16 +93,16 @@ def write_records(
     nz = ux * vy - uy * vx
     ax, ay, az = ax - eye[0], ay - eye[1], az - eye[2]
     k = nx * ax + ny * ay + nz * az
-    scale = sigma / (k * frame[3, 3] - row_of(frame, 3, nx, ny, nz))
-    ddx = scale * row_of(frame, 0, nx, ny, nz)
-    ddy = scale * row_of(frame, 1, nx, ny, nz)
-    centre = scale * (row_of(frame, 2, nx, ny, nz) - k * frame[2, 3])
+    scale = sigma / (k * frame[3, 3] - mapped(frame, 3, nx, ny, nz))
+    ddx = scale * mapped(frame, 0, nx, ny, nz)
+    ddy = scale * mapped(frame, 1, nx, ny, nz)
+    centre = scale * (mapped(frame, 2, nx, ny, nz) - k * frame[2, 3])
     # False for the NaN and the infinities of a division by zero.
     some = (simd.absolute(centre) < HUGE) & (simd.absolute(ddx) < HUGE)
     some = some & (simd.absolute(ddy) < HUGE)
-    wa, da = row_of(m, 2, ax, ay, az) + m[2, 3], row_of(m, 3, ax, ay, az) + m[3, 3]
-    zb = depth_of(wa + row_of(m, 2, ux, uy, uz), da + row_of(m, 3, ux, uy, uz))
-    zc = depth_of(wa + row_of(m, 2, vx, vy, vz), da + row_of(m, 3, vx, vy, vz))
+    wa, da = mapped(m, 2, ax, ay, az) + m[2, 3], mapped(m, 3, ax, ay, az) + m[3, 3]
+    zb = depth_of(wa + mapped(m, 2, ux, uy, uz), da + mapped(m, 3, ux, uy, uz))
+    zc = depth_of(wa + mapped(m, 2, vx, vy, vz), da + mapped(m, 3, vx, vy, vz))
     za = depth_of(wa, da)
     farthest = simd.to_f32(simd.minimum(simd.minimum(za, zb), zc))
     nearest = simd.to_f32(simd.maximum(simd.maximum(za, zb), zc))

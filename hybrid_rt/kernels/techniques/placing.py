@@ -22,13 +22,13 @@ import numpy as np
 
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._jit import inlined
+from hybrid_rt.kernels.raster.clip import mapped
 from hybrid_rt.kernels.techniques.screen import (
     BEFORE_FAR,
     INVALID,
     MISS,
     NEAR,
     OFFSCREEN,
-    mapped,
 )
 
 LANES = 2 * simd.WIDTH

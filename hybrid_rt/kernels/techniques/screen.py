@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from hybrid_rt.kernels._jit import inlined
+from hybrid_rt.kernels.raster.clip import mapped
 
 # rays.marched.MarchStatus
 HIT, MISS, OFFSCREEN, HIDDEN, NEAR, EXHAUSTED, INVALID, UNDECIDED, SKIPPED = range(9)
@@ -21,12 +22,6 @@ BEFORE_FAR = 1.0 - 2.0**-16
 to it for rounding does not lead beyond."""
 LARGEST_T = float(np.finfo(np.float32).max)
 """A hit whose t float32 cannot hold is given this one: infinity would say that there is none."""
-
-
-@inlined
-def mapped(m, k, x, y, z):
-    """Return row k of a map, without its constant, times a vector."""
-    return m[k, 0] * x + m[k, 1] * y + m[k, 2] * z
 
 
 @inlined

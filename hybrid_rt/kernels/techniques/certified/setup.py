@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from hybrid_rt.kernels import simd
 from hybrid_rt.kernels._jit import called, inlined
+from hybrid_rt.kernels.raster.clip import mapped
 from hybrid_rt.kernels.techniques.certified.scalar import (
     BEYOND,
     DEPTH_ULPS,
@@ -62,7 +63,6 @@ from hybrid_rt.kernels.techniques.screen import (
     NEAR,
     OFFSCREEN,
     UNDECIDED,
-    mapped,
 )
 
 
